@@ -11,7 +11,7 @@ from .execution.step import Step
 from .execution.transitions import end_plainly
 from .execution.trial import ContainerRun
 from .execution.visiting import execute_observed, execute_watched
-from .execution.wrapping import execute_bare, sync_oracle, wrap_machine
+from .execution.wrapping import WrapArguments, execute_bare, sync_oracle, wrap_machine
 from .identity import renew_attributes
 from .machine.oracle import oracle_of, read_by_hand, write_by_hand
 from .machine.tree import Tree, new_id
@@ -126,15 +126,9 @@ class OracleContainer(smach.StateMachine):
         """
         checked = as_settings(settings, preconditions)
         tree = Tree(OracleContainer, recover, expert, health)
-        wrapped = wrap_machine(
-            cls,
-            machine,
-            tree,
-            checked,
-            checked.nested if nested is None else checked_nested('nested', nested),
-            name,
-            strict,
-        )
+        within = checked.nested if nested is None else checked_nested('nested', nested)
+        arguments = WrapArguments(checked, within, name, strict)
+        wrapped = wrap_machine(cls, machine, tree, arguments)
         return cast(OracleContainer, wrapped)
 
     @staticmethod

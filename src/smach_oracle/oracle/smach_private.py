@@ -339,21 +339,20 @@ class EngineProbe:
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
         if not self._is_class_known or type(machine) is not self._class:
-            self._look_at_class(type(machine))
+            cls: Any = type(machine)
+            if cls is not self._class:
+                self._class, self._class_steps_as_drawn = cls, _steps_as_drawn(cls)
+            self._is_class_known = True
+            self._class_step = getattr(cls, '_update_once', None)
+            self._class_is_asked = cls.preempt_requested is not smach.State.preempt_requested
+            told = cls.call_transition_cbs
+            self.tells_transitions = told is not smach.Container.call_transition_cbs
         self.stays_attentive = stays_attentive or self._class_is_asked
         # nobody but SMACH and this package has a say in how the machine steps
         step = getattr(machine, '_update_once', None)
         self.has_own_loop = (
             self._class_steps_as_drawn and getattr(step, '__func__', None) is self._class_step
         )
-
-    def _look_at_class(self, cls: Any) -> None:
-        if cls is not self._class:
-            self._class, self._class_steps_as_drawn = cls, _steps_as_drawn(cls)
-        self._is_class_known = True
-        self._class_step = getattr(cls, '_update_once', None)
-        self._class_is_asked = cls.preempt_requested is not smach.State.preempt_requested
-        self.tells_transitions = cls.call_transition_cbs is not smach.Container.call_transition_cbs
 
     def __reduce__(self) -> Tuple[Type['EngineProbe'], Tuple[()]]:
         """A copied or pickled machine is looked at when it executes."""

@@ -162,7 +162,7 @@ def test_later_in_a_streak_a_moved_way_hopes_for_the_chance_of_a_later_place():
 def test_a_streak_that_goes_on_knows_which_way_was_moved():
     streaks = Streaks()
     streak = OpenStreak(0, 0.0, ())
-    streaks.begin('A', streak)
+    streaks['A'] = streak
     streak.note('from B', moved=True)
     streak.note('again')
     again = Streaks()

@@ -473,7 +473,7 @@ def test_where_no_state_is_guarded_nothing_is_noted():
     assert not node.tree.numbers_visits and not any(
         record.special for record in node.records.by_label.values()
     )
-    assert node.records.marks.of('POUR').reached == 0
+    assert node.records.marks['POUR'].reached == 0
 
 
 def test_guards_come_and_go_with_the_settings():

@@ -8,8 +8,8 @@ from fake_clock import FakeClock
 from machines import in_thread
 
 from smach_oracle.oracle.scope.background_call import BackgroundCall
-from smach_oracle.oracle.scope.clock import Clock, Flag, PausableClock, paused
-from smach_oracle.oracle.scope.scope import LOOK_S, CallEnd, Reason, Scope
+from smach_oracle.oracle.scope.clock import Clock, Flag, PausableClock
+from smach_oracle.oracle.scope.scope import LOOK_S, CallEnd, Reason, Scope, standing_still
 
 BRIEF_S = 0.1  # waited for in full
 
@@ -29,7 +29,7 @@ def test_a_clock_shows_no_time_in_which_anybody_paused_it(pauses):
     with time_.paused():
         clock.advance(3.0)
         if pauses == 2:
-            with paused([time_]):
+            with standing_still([Scope(clock=clock, time=time_)]):
                 clock.advance(2.0)
         clock.advance(5.0)
         assert time_.now() == 1.0

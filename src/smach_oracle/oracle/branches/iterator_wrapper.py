@@ -28,7 +28,7 @@ class IteratorWrapper(ContainerWrapper):
         self._given: Dict[str, Any] = {}  # its io keys when it began
         self.at_item: Optional[Dict[str, Any]] = None  # its userdata as the item under way began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
-        self._is_left = False
+        self.is_left = False
         self._is_asked_to_go_on = False
         self.goes_on = False
 
@@ -46,10 +46,6 @@ class IteratorWrapper(ContainerWrapper):
             or is_preempted(outcome)
             or isinstance(judge(node, node.record(label), outcome, None), Failure)
         )
-
-    def note_left(self) -> None:
-        """Note that it is left for a state elsewhere: the outcome it gets is no word of its own."""
-        self._is_left = True
 
     def items(self, container: smach.Container, items: Any) -> Any:
         """Return what the Iterator goes through in place of its items."""
@@ -76,7 +72,7 @@ class IteratorWrapper(ContainerWrapper):
         else:
             self._rounds += 1
         self.tracked, self._trial_id, self._ended_with = items, trial_id, None
-        self._is_left = False
+        self.is_left = False
         self._inside = inside
         for branch in self.branches.values():
             branch.begin(self)
@@ -125,7 +121,7 @@ class IteratorWrapper(ContainerWrapper):
 
     def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
-        self._ended_with = outcome if isinstance(outcome, str) and not self._is_left else None
+        self._ended_with = outcome if isinstance(outcome, str) and not self.is_left else None
         if self.tracked is not None and self.tracked.is_exhausted:
             # the author has gone on behind it where an oracle has given up
             for _, machine in machines_below(self.container):

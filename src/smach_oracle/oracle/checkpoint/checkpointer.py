@@ -25,25 +25,23 @@ from .stored_tree import StoredTree
 
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
-_COMMITTED = frozenset(
-    (
-        EventKind.TRIAL_START,
-        EventKind.RESUMED,
-        EventKind.STATE_START,
-        EventKind.PRECONDITION_START,
-        EventKind.DECISION,
-        EventKind.QUERY_OPENED,
-        EventKind.QUERY_ANSWERED,
-        EventKind.QUERY_EXPIRED,
-        EventKind.QUERY_CANCELLED,
-        EventKind.JUMP,
-        EventKind.SUPERSEDE,
-        EventKind.GIVE_UP,
-        EventKind.HOLD_START,
-        EventKind.SENT,
-        EventKind.TRIAL_END,
-    )
-)
+_COMMITTED = {
+    EventKind.TRIAL_START,
+    EventKind.RESUMED,
+    EventKind.STATE_START,
+    EventKind.PRECONDITION_START,
+    EventKind.DECISION,
+    EventKind.QUERY_OPENED,
+    EventKind.QUERY_ANSWERED,
+    EventKind.QUERY_EXPIRED,
+    EventKind.QUERY_CANCELLED,
+    EventKind.JUMP,
+    EventKind.SUPERSEDE,
+    EventKind.GIVE_UP,
+    EventKind.HOLD_START,
+    EventKind.SENT,
+    EventKind.TRIAL_END,
+}
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 

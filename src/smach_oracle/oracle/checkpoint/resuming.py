@@ -220,11 +220,11 @@ def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> 
         node = by_key.get(path)
         if node is not None and (mark.done or mark.reached) and label in node.labels():
             node.record(label)  # of a state that only a precondition has run, too
-            node.records.marks.take_over(label, mark)
+            node.records.marks[label] = mark
     for place in (TreePlace(node, label) for node in nodes if in_doubt for label in node.labels()):
         if place.node.settings_of(place.label).on_retry != ALLOW:
             place.node.record(place.label)
-            unknown = place.node.records.marks.of(place.label)
+            unknown = place.node.records.marks[place.label]
             unknown.done = unknown.spent = True
     return max((max(mark.reached, mark.executed) for mark in marks.values()), default=0)
 
@@ -435,7 +435,7 @@ class _Setting:
             else:
                 kind = FailureKind(number)
         else:
-            node.records.marks.of(stored.label).spent = True  # it may have been done
+            node.records.marks[stored.label].spent = True  # it may have been done
         snapshot = snapshots.get(stored.label)
         return Unfinished(kind, outcome, text, why, snapshot, self._resumption.asks)
 

@@ -52,11 +52,9 @@ def marks_now(
 
 def _mark_of(container: StoredContainer, label: str) -> VisitMark:
     """Return a mark. Where no state was guarded, visits were counted, and not numbered."""
-    mark = VisitMark()
     told = container.marks.get(label, [0, 0, 0, 0])
-    mark.reached, mark.executed, mark.spent = told[0], told[1], bool(told[3])
-    mark.done = bool(told[2] or container.visits_of(label) or label in container.begun)
-    return mark
+    is_done = bool(told[2] or container.visits_of(label) or label in container.begun)
+    return VisitMark(told[0], told[1], is_done, bool(told[3]))
 
 
 def _joined(one: VisitMark, other: VisitMark) -> VisitMark:

@@ -4,7 +4,7 @@ doc/ways.md says what is on the menu, what a way costs, and which one is taken.
 """
 
 from operator import itemgetter
-from typing import Collection, List, Mapping, Sequence, Tuple
+from typing import Collection, Mapping, Sequence, Tuple
 
 from .failure_rate import FailureClass
 from .policy import Action, Baseline, Menu, Situation, draws_of
@@ -141,9 +141,6 @@ class Escalating(Baseline):
             return float(key == first)
         return 1.0 - self.explore if key == first else self.explore
 
-    def _left(self, menu: Menu) -> List[Way]:
-        return [way for way in menu.ways if not way.blocked and way.key not in menu.streak.tried]
-
     def _spent(self, situation: Situation) -> str:
         past, streak = situation.past, situation.menu.streak
         if streak.attempts >= self.most_of_streak:
@@ -160,8 +157,8 @@ class Escalating(Baseline):
         spent = self._spent(situation)
         if spent or self.order(situation):
             return spent
-        left = self._left(situation.menu)
-        if not left:
+        menu = situation.menu
+        if all(way.blocked or way.key in menu.streak.tried for way in menu.ways):
             return (
                 'no other way is open' if not situation.menu.streak.tried else 'all ways are tried'
             )

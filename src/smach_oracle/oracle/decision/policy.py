@@ -114,8 +114,11 @@ class Policy:
         return type(self)(**given) if given else self
 
     def is_continuous(self, context: FailureContext) -> bool:
-        """Whether this is a continuous failure in the policy's sense."""
-        raise NotImplementedError
+        """Whether this is a continuous failure in the policy's sense.
+
+        Here the last failure was of the same state, which has not succeeded since.
+        """
+        return context.failing_since
 
     def runs_preconditions(self, failure_class: FailureClass) -> bool:
         """Whether the preconditions of a failed state of this class are run."""
@@ -163,9 +166,9 @@ class Policy:
         """Return the state that a step back leads to.
 
         It is a label of the container, or a path below the top machine, such as KITCHEN/LOOK or
-        /HOME.
+        /HOME. Here it is the last successful state before the failed one.
         """
-        raise NotImplementedError
+        return context.initial if context.succeeded_before is None else context.succeeded_before
 
 
 class Algorithm1(Policy):
@@ -202,10 +205,6 @@ class Prose(Policy):
 
     name = 'prose'
 
-    def is_continuous(self, context: FailureContext) -> bool:
-        """Return whether the last failure was of the same state, which has not succeeded since."""
-        return context.failing_since
-
     def decide(self, situation: Situation) -> Action:
         """Look the cell up."""
         failure_class, preconditions, continuous = situation[:3]
@@ -214,10 +213,6 @@ class Prose(Policy):
         if not continuous and preconditions is not Preconditions.NOT_MET:
             return Action.REVISIT
         return Action.STEP_BACK if failure_class is FailureClass.LOW else Action.ASK
-
-    def step_back_target(self, context: FailureContext) -> str:
-        """Return the last successful state before the failed one."""
-        return context.initial if context.succeeded_before is None else context.succeeded_before
 
 
 # -- baselines, which go by neither rates nor preconditions: the others are measured against them
@@ -235,17 +230,9 @@ def draws_of(seed: int, past: Past) -> random.Random:
 class Baseline(Policy):
     """The methods that all baselines have in common, and those policies that go by ways."""
 
-    def is_continuous(self, context: FailureContext) -> bool:
-        """Return whether the last failure was of the same state, which has not succeeded since."""
-        return context.failing_since
-
     def runs_preconditions(self, failure_class: FailureClass) -> bool:
         """Return False: it never runs preconditions before it decides."""
         return False
-
-    def step_back_target(self, context: FailureContext) -> str:
-        """Return the last successful state before the failed one, as `prose` does."""
-        return context.initial if context.succeeded_before is None else context.succeeded_before
 
 
 class Repeating(Baseline):

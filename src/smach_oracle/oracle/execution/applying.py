@@ -86,7 +86,7 @@ class Applying:
             entry = prepare_entry(way, jump.written, 'jumping')
             userdata, missing = entry.userdata, entry.missing
         self._note_entry(way.first_label)
-        lower = self._occasion.lower_verdict
+        lower = self._occasion.departure
         told = {  # of a jump by a way of the menu, or across containers
             **({} if jump.chosen is None else {'way': jump.chosen.gone.way}),
             **({} if lower is None else {JUMPED_FROM: lower.failed_path}),

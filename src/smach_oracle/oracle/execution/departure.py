@@ -12,57 +12,13 @@ import smach
 from ..branches.iterator_wrapper import IteratorWrapper
 from ..branches.wrapper import wrapper_of
 from ..machine.nesting import gave_up_in, nodes_in
-from ..machine.places import levels_above, links_to, repeated_on, why_closed_on
+from ..machine.places import levels_above, links_to
 from ..machine.tree_node import TreeNode
 from ..machine.workers import request_preempt
 from ..records.events import FailureKind
 from ..recovery.failure import Failure
-from ..recovery.occasions import LowerVerdict
-from ..recovery.verdict import GiveUp, JumpTo, Verdict, arrives_at
+from ..recovery.verdict import Departure, GiveUp, JumpTo, Verdict, arrives_at
 from ..smach_private import current_label_of, current_state_of, states_of
-
-
-class Departure:
-    """A verdict on its way from the container of a failure to the level that follows it."""
-
-    def __init__(self, verdict: Verdict, arrives_at: TreeNode, failed_path: str) -> None:
-        """`failed_path`: that of the failed state."""
-        self.verdict = verdict
-        self.arrives_at = arrives_at
-        self.failed_path = failed_path
-        self.is_decided_again = isinstance(verdict, JumpTo) and verdict.chosen is not None
-        self._repeated = (
-            set(repeated_on(verdict.jump_path)) if isinstance(verdict, JumpTo) else set()
-        )
-
-    def lower_verdict(self) -> LowerVerdict:
-        """Return what it is to the level that follows it."""
-        verdict = self.verdict
-        if isinstance(verdict, GiveUp):
-            verdict = verdict._replace(level=None)  # it is the one that ends
-        return LowerVerdict(verdict, self.failed_path, self.why_not)
-
-    def why_not(self) -> str:
-        """Say what prevents it at its arrival that did not when it was decided, or '' if nothing.
-
-        What was preempted may have gone on for a while.
-        """
-        if not isinstance(self.verdict, JumpTo):
-            return ''
-        way = self.verdict.jump_path
-        closed = why_closed_on(way)
-        repeated = sorted(set(repeated_on(way)).difference(self._repeated))
-        if not (closed or repeated):
-            return ''
-        place = way.entered_places[-1].path
-        return 'cannot go to {}: {}'.format(
-            place,
-            closed or '{} was done while the way there was made free'.format(', '.join(repeated)),
-        )
-
-    def is_own(self, node: TreeNode) -> bool:
-        """Whether a container's own oracle has decided, as if its state had failed."""
-        return isinstance(self.verdict, JumpTo) and self.verdict.decided_by is node
 
 
 def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
@@ -116,7 +72,7 @@ def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
     for container in around[:-1]:
         wrapper = wrapper_of(container)
         if isinstance(wrapper, IteratorWrapper):
-            wrapper.note_left()
+            wrapper.is_left = True
         if not container.preempt_requested():
             request_preempt(container)
 

@@ -33,6 +33,7 @@ from ..recovery.still_running import EndedByAnswer
 from ..recovery.stop import note_end_under_preempt, winds_down
 from ..recovery.verdict import (
     ContainerEnding,
+    Departure,
     Preempted,
     Verdict,
     arrives_at,
@@ -43,7 +44,7 @@ from ..recovery.verdict import (
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
-from .departure import Departure, depart, is_settled, take_departure
+from .departure import depart, is_settled, take_departure
 from .transitions import Stop, be_back, go_to, message_of, obey_preempt, stop_left_behind, terminate
 from .wrapping import sync_oracle
 
@@ -59,7 +60,7 @@ def _facts_of(occasion: Occasion, label: str) -> Facts:
     """Return further fields of the event with which a state gives way to the oracle."""
     failure = occasion.failure
     if failure.state == label:
-        return NO_FACTS if occasion.lower_verdict is None else LEFT
+        return NO_FACTS if occasion.departure is None else LEFT
     told = [failure.state, int(failure.kind), failure.outcome, failure.text]
     return {'text': 'reports a failure of ' + failure.state, 'data': {TAKEN_UP: told}}
 
@@ -173,9 +174,7 @@ class Step:
             'was left, as {} failed'.format(departure.failed_path),
             None,
         )
-        return occasions.arrived(
-            failure, self._context(), departure.lower_verdict(), told, departure.is_own(node)
-        )
+        return occasions.arrived(failure, self._context(), departure, told, departure.is_own(node))
 
     def _warn_raised(self, error: Exception, when: str) -> None:
         smach.logwarn(

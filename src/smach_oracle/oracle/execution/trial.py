@@ -158,21 +158,13 @@ def _end_trial(
 def _settings(node: TreeNode) -> Dict[str, object]:
     """Return the settings by which the top oracle decides, without those of single states."""
     settings, defaults = node.settings, node.settings.defaults
-    parameters = sorted(settings.policy_parameters.items())
+    told = ('memory', 'estimator', 'prior', 'moderate_from', 'high_from', 'max_recoveries')
+    costs = settings.cost._asdict() if node.in_force.policy.goes_by_ways else {}
     return {
         'policy': settings.policy,
-        **{'policy.' + name: value for name, value in parameters},
-        **(
-            {'cost.' + name: value for name, value in settings.cost._asdict().items()}
-            if node.in_force.policy.goes_by_ways
-            else {}
-        ),
-        'memory': defaults.memory,
-        'estimator': defaults.estimator,
-        'prior': defaults.prior,
-        'moderate_from': defaults.moderate_from,
-        'high_from': defaults.high_from,
-        'max_recoveries': defaults.max_recoveries,
+        **{'policy.' + name: value for name, value in sorted(settings.policy_parameters.items())},
+        **{'cost.' + name: value for name, value in costs.items()},
+        **{name: getattr(defaults, name) for name in told},
     }
 
 

@@ -1,6 +1,6 @@
 """Puts a machine, and those nested in it, under one oracle each, and takes them out again."""
 
-from typing import Any, List, Optional
+from typing import Any, List, NamedTuple, Optional
 
 import smach
 
@@ -21,14 +21,17 @@ from .boundary import place_gates, remove_gates
 from .settings_check import check_names, check_preconditions
 
 
+class WrapArguments(NamedTuple):
+    """The arguments of a wrap that hold for the machine and for what it finds in it."""
+
+    settings: Settings
+    nested: Nested
+    name: str
+    strict: Strictness
+
+
 def wrap_machine(
-    oracle_class: type,
-    given: object,
-    tree: Tree,
-    settings: Settings,
-    nested: Nested,
-    name: str,
-    strict: Strictness,
+    oracle_class: type, given: object, tree: Tree, arguments: WrapArguments
 ) -> smach.StateMachine:
     """Wrap a machine and what is nested in it. See OracleContainer.wrap.
 
@@ -40,10 +43,11 @@ def wrap_machine(
     if not isinstance(given, smach.StateMachine):
         raise SettingsError('machine', given, 'a smach.StateMachine')
     if isinstance(given, tree.container_class):
-        return _wrap_again(given, tree, settings, nested, name, strict)
+        return _wrap_again(given, tree, arguments)
     try:
+        settings, name = arguments.settings, arguments.name
         machine = _put_under(given, oracle_class, tree, settings, name).machine
-        _put_in_order(machine, settings, nested, strict)
+        _put_in_order(machine, arguments)
     except SettingsError:  # as if nobody had tried
         if isinstance(given, tree.container_class):
             _strip(given)
@@ -60,15 +64,13 @@ def _put_under(
     return node
 
 
-def _put_in_order(
-    machine: smach.StateMachine, settings: Settings, nested: Nested, strict: Strictness
-) -> None:
+def _put_in_order(machine: smach.StateMachine, arguments: WrapArguments) -> None:
     top = marked_node(machine)
-    top.in_force.strict, top.in_force.nested = strict, nested
+    top.in_force.strict, top.in_force.nested = arguments.strict, arguments.nested
     adopt(machine)
-    _configure(machine, settings)
+    _configure(machine, arguments.settings)
     for node in nodes_of(machine):
-        node.in_force.strict = strict
+        node.in_force.strict = arguments.strict
     for node in nodes_of(machine):
         bring_up_to_date(node)
 
@@ -96,12 +98,7 @@ def _configure(machine: smach.StateMachine, settings: Settings) -> None:
 
 
 def _wrap_again(
-    machine: smach.StateMachine,
-    tree: Tree,
-    settings: Settings,
-    nested: Nested,
-    name: str,
-    strict: Strictness,
+    machine: smach.StateMachine, tree: Tree, arguments: WrapArguments
 ) -> smach.StateMachine:
     top = marked_node(machine)
     before = top.settings
@@ -109,13 +106,13 @@ def _wrap_again(
         for container in containers_in(machine):
             remove_oracle(marked_node(container))
         top.tree.recover = tree.recover
-        top.take_name(name)
+        top.take_name(arguments.name)
         if tree.expert is not None:
             top.tree.expert = tree.expert
         if tree.health.given is not None:
             top.tree.health.given = tree.health.given
-        _configure(machine, settings)
-        _put_in_order(machine, settings, nested, strict)
+        _configure(machine, arguments.settings)
+        _put_in_order(machine, arguments)
     except SettingsError:
         _configure(machine, before)
         raise

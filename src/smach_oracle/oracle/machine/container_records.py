@@ -127,8 +127,8 @@ class ContainerRecords:
     def begin_trial(self) -> None:
         """Forget what belongs to a trial. The rates stay."""
         self.history.begin_trial()
-        self.marks.begin_trial()
-        self.streaks.begin_trial()
+        self.marks.clear()
+        self.streaks.clear()
         for record in self.by_label.values():
             record.begin_trial()
 

@@ -30,10 +30,10 @@ def save_rates(node: TreeNode) -> None:
     path = top.settings.rates_file
     if not path:
         return
-    claim(path, _name(top), top.tree)
+    claim(path, top.in_force.name, top.tree)
     try:
         with node.tree.rates_lock:
-            share_rates(path, _name(top), nodes_of(top.machine), top.in_force.rule)
+            share_rates(path, top.in_force.name, nodes_of(top.machine), top.in_force.rule)
     except OSError as err:
         node.warn_once(path, 'rates file {} cannot be written: {}'.format(path, err))
 
@@ -44,8 +44,8 @@ def load_rates(node: TreeNode) -> None:
     if node.parent is None and node.tree.rates_loaded != path:
         node.tree.rates_loaded = path
         if path:
-            claim(path, _name(node), node.tree)
-        read_rates(path, _name(node), nodes_of(node.machine), True, node.in_force.rule)
+            claim(path, node.in_force.name, node.tree)
+        read_rates(path, node.in_force.name, nodes_of(node.machine), True, node.in_force.rule)
 
 
 def write_by_hand(node: TreeNode, path: str) -> None:
@@ -53,19 +53,15 @@ def write_by_hand(node: TreeNode, path: str) -> None:
 
     :raises OSError: where it cannot be written.
     """
-    claim(path, _name(node.top()), node.tree)
+    claim(path, node.top().in_force.name, node.tree)
     top = node.top()
-    write_rates(path, _name(top), nodes_of(node.machine), top.in_force.rule)
+    write_rates(path, top.in_force.name, nodes_of(node.machine), top.in_force.rule)
 
 
 def read_by_hand(node: TreeNode, path: str) -> None:
     """Take over what a file has of a machine."""
     top = node.top()
-    read_rates(path, _name(top), nodes_of(node.machine), False, top.in_force.rule)
-
-
-def _name(top: TreeNode) -> str:
-    return top.name if top.is_named else ''
+    read_rates(path, top.in_force.name, nodes_of(node.machine), False, top.in_force.rule)
 
 
 class Oracle:

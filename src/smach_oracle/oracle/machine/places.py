@@ -274,6 +274,9 @@ def _is_in_iterator(place: TreePlace, node: TreeNode) -> bool:
     )
 
 
+# -- the way to a place
+
+
 class JumpPath(NamedTuple):
     """The way from a container to a place: out to where they meet, and down again.
 
@@ -386,7 +389,10 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
 
 def hand_down(link: ContainerLink) -> None:
     """Give a container its input keys, as when it begins."""
-    given = {**data_of(link.outer_container.userdata), **_constants(link)}
+    outer = link.outer_container
+    given = dict(data_of(outer.userdata))
+    if isinstance(outer, smach.StateMachine):
+        given.update(constants_of(outer, link.label))
     for key, named in _inputs(link):
         if named in given:
             link.inner_container.userdata[key] = given[named]
@@ -437,11 +443,3 @@ def _inputs(link: ContainerLink) -> Sequence[Tuple[str, str]]:
         (key, link.remapping.get(key, key))
         for key in link.inner_container.get_registered_input_keys()
     ]
-
-
-def _constants(link: ContainerLink) -> Mapping[str, object]:
-    return (
-        constants_of(link.outer_container, link.label)
-        if isinstance(link.outer_container, smach.StateMachine)
-        else {}
-    )

@@ -37,7 +37,7 @@ def begin_watching(tree: Tree, nodes: Sequence[TreeNode]) -> None:
 
 def note_visit(node: TreeNode, record: StateRecord) -> str:
     """Note that the machine has come to a state. Return why it is not executed, or ''."""
-    mark = node.records.marks.of(record.label)
+    mark = node.records.marks[record.label]
     mark.reached = node.tree.next_visit()
     why_not = why_held_back(node, record)
     if not why_not:
@@ -49,7 +49,7 @@ def note_visit(node: TreeNode, record: StateRecord) -> str:
 def why_held_back(node: TreeNode, record: StateRecord) -> str:
     """Return why a state is not executed when the machine comes to it, or '' where it is."""
     on_retry = record.settings.on_retry
-    if on_retry == ALLOW or not node.records.marks.of(record.label).spent:
+    if on_retry == ALLOW or not node.records.marks[record.label].spent:
         return ''
     return 'was done in this trial and {}'.format(
         'must not be repeated' if on_retry == NEVER else 'is not repeated by itself'
@@ -58,7 +58,7 @@ def why_held_back(node: TreeNode, record: StateRecord) -> str:
 
 def has_visited(node: TreeNode, label: str) -> bool:
     """Whether the machine has come to a state in this trial."""
-    return bool(node.records.marks.of(label).reached)
+    return bool(node.records.marks[label].reached)
 
 
 def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
@@ -71,7 +71,7 @@ def repeated_by_going_to(node: TreeNode, target: str) -> Tuple[str, ...]:
     """
     if not node.tree.numbers_visits:
         return ()
-    since = node.records.marks.of(target).reached
+    since = node.records.marks[target].reached
     done = list(_done_below(node))
     reached = _reached_from(node, target) if done else set()
     return tuple(
@@ -114,7 +114,7 @@ def leave_for(node: TreeNode, target: str, below: Iterable[Tuple[TreeNode, str]]
         return
     leave_unconfirmed(node, target)
     for each, label in ((node, target), *below):
-        each.records.marks.of(label).spent = False
+        each.records.marks[label].spent = False
 
 
 def leave_unconfirmed(node: TreeNode, target: str) -> None:
@@ -122,7 +122,7 @@ def leave_unconfirmed(node: TreeNode, target: str) -> None:
 
     What may come again now is spent, the state itself among it: nobody has confirmed anything.
     """
-    since = node.records.marks.of(target).reached
+    since = node.records.marks[target].reached
     for done in _done_below(node):
         if done.mark.executed >= since:
             done.mark.spent = True
@@ -137,7 +137,7 @@ def note_initial(node: TreeNode, label: str) -> None:
 
 def begin_once_more(node: TreeNode, label: str) -> None:
     """Let a state, and all in it, come again as if it had not begun: a person wants it so."""
-    node.records.marks.take_over(label, VisitMark())
+    node.records.marks[label] = VisitMark()
     for done in list(_done_within(node, label)):
         done.mark.done = done.mark.spent = False
 
@@ -149,7 +149,7 @@ def note_superseded(node: TreeNode, label: str) -> None:
     """
     if not node.tree.numbers_visits:
         return
-    mark = node.records.marks.of(label)
+    mark = node.records.marks[label]
     mark.reached = mark.executed = node.tree.next_visit()
     mark.done, mark.spent = True, False
 
@@ -159,7 +159,7 @@ def why_closed(node: TreeNode, label: str) -> str:
     blocked = node.tree.workers.blocked(states_of(node.machine)[label])
     if blocked or not node.tree.numbers_visits:
         return blocked
-    if node.records.marks.of(label).done and node.settings_of(label).on_retry == NEVER:
+    if node.records.marks[label].done and node.settings_of(label).on_retry == NEVER:
         return 'was done in this trial and must not be repeated (on_retry: never)'
     return ''
 
@@ -179,7 +179,7 @@ def note_precondition(node: TreeNode, label: str) -> None:
     if not node.tree.numbers_visits:
         return
     node.record(label)
-    node.records.marks.of(label).done = True
+    node.records.marks[label].done = True
     for done in _done_within(node, label):
         done.mark.spent = True
         done.mark.reached = done.mark.executed = 0
@@ -196,7 +196,7 @@ def _done_below(node: TreeNode) -> Iterator[_Done]:
     for each in nodes_of(node.machine):
         path = each.path[len(node.path) + 1 :]
         for label, record in list(each.records.by_label.items()):
-            mark = each.records.marks.of(label)
+            mark = each.records.marks[label]
             if mark.done and record.settings.on_retry != ALLOW:
                 yield _Done('{}/{}'.format(path, label) if path else label, mark)
 

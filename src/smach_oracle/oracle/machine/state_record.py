@@ -1,7 +1,18 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
 
 import threading
-from typing import TYPE_CHECKING, Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Callable,
+    Counter,
+    Dict,
+    List,
+    Mapping,
+    NamedTuple,
+    Optional,
+    Tuple,
+)
 
 from ..decision.failure_rate import (
     Estimator,
@@ -86,7 +97,7 @@ class StateRecord:
         # its latest failure in this program: kind, outcome and text
         self.last_failure: Optional[Tuple[FailureKind, str, str]] = None
         self._retired = 0  # successes by way of edges that are no more
-        self._edges: Dict[Tuple[str, str], int] = {}  # transitions not counted by an FastEdge
+        self._edges: Counter[Tuple[str, str]] = Counter()  # transitions not counted by an FastEdge
         self._visits = 0  # not counted by an FastEdge
         self._visits_before = 0  # visits of earlier trials
         self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
@@ -175,26 +186,25 @@ class StateRecord:
         with self._lock:
             return self._ways.told()
 
-    def merged_with(self, theirs: Mapping[str, object]) -> Dict[str, object]:
-        """Return what others have learned, with what was learned here since it was last shared.
+    def merged_with(
+        self, theirs: Mapping[str, object], base: Optional[Mapping[str, object]] = None
+    ) -> Dict[str, object]:
+        """Return what others have learned, with what was learned here since `base`.
+
+        :param base: None: what was last shared.
 
         :raises ValueError: where theirs cannot be read.
         """
         with self._lock:
-            return self._merged(self.shared, theirs)
-
-    def _merged(
-        self, base: Mapping[str, object], theirs: Mapping[str, object]
-    ) -> Dict[str, object]:
-        own = self.learned()
-        rates = merged(own, base, theirs, self.settings.memory)
-        return {**rates, **merged_ways(own, base, theirs)}
+            own, base = self.learned(), self.shared if base is None else base
+            rates = merged(own, base, theirs, self.settings.memory)
+            return {**rates, **merged_ways(own, base, theirs)}
 
     def share(self, before: Mapping[str, object], written: Mapping[str, object]) -> None:
         """Have what is shared now. `before`: what was learned here when it was merged."""
         with self._lock:
             if before != written:
-                self.restore(self._merged(base_of(before), written))
+                self.restore(self.merged_with(written, base_of(before)))
             self.shared = base_of(written)
 
     @property
@@ -286,7 +296,7 @@ class StateRecord:
 
     def left_by(self, outcome: str, target: str) -> None:
         """Count a transition that took no FastEdge."""
-        self._edges[outcome, target] = self._edges.get((outcome, target), 0) + 1
+        self._edges[outcome, target] += 1
 
     def visit_ended(self) -> None:
         """Count a visit that ended without an FastEdge."""
@@ -294,9 +304,9 @@ class StateRecord:
 
     def transitions(self) -> Dict[Tuple[str, str], int]:
         """Return how often each (outcome, target) was taken."""
-        counts = dict(self._edges)
+        counts = self._edges.copy()
         for outcome, edge in list(self.fast.items()):
-            counts[outcome, edge.leads_to] = counts.get((outcome, edge.leads_to), 0) + edge.count
+            counts[outcome, edge.leads_to] += edge.count
         return counts
 
     def restore(self, learned: Mapping[str, object]) -> None:
@@ -337,6 +347,4 @@ class StateRecord:
             edge = self.fast.pop(outcome)
             self._retired += edge.count
         if edge.count:
-            self._edges[outcome, edge.leads_to] = (
-                self._edges.get((outcome, edge.leads_to), 0) + edge.count
-            )
+            self._edges[outcome, edge.leads_to] += edge.count

@@ -7,7 +7,7 @@ import itertools
 import os
 import threading
 import uuid
-from typing import Any, Callable, Dict, List, Mapping, Optional, Set, Tuple, Type
+from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple, Type
 
 import smach
 from smach_oracle.forking import is_child
@@ -81,8 +81,8 @@ class Tree:
         self.keep_marks: Callable[[], None] = no_store
         # what a state that failed by outcome says of it
         self.describe_failure: Callable[[smach.State], str] = no_description
-        # states that are executed as preconditions now, each with its container
-        self._preconditions: List[Tuple[object, smach.State]] = []
+        # ids of containers and states that are executed as preconditions now
+        self._preconditions: Set[Tuple[int, int]] = set()
         self.restarts, self.resumed = Restarts(), ResumedTrial()
         self.scope = Scope(
             look=lambda: Reason.SHUTDOWN if smach.is_shutdown() else None, clock=clock
@@ -150,20 +150,17 @@ class Tree:
         """Note that a state is executed as a precondition. Return False where it is so already."""
         with self._lock:
             is_free = not self.is_precondition(node, state)
-            if is_free:
-                self._preconditions.append((node, state))
+            self._preconditions.add((id(node), id(state)))
             return is_free
 
     def end_precondition(self, node: object, state: smach.State) -> None:
         """Note that it has ended."""
         with self._lock:
-            self._preconditions = [
-                each for each in self._preconditions if each[0] is not node or each[1] is not state
-            ]
+            self._preconditions.discard((id(node), id(state)))
 
     def is_precondition(self, node: object, state: object) -> bool:
         """Whether a state of a container is executed as a precondition now."""
-        return any(each[0] is node and each[1] is state for each in self._preconditions)
+        return (id(node), id(state)) in self._preconditions
 
     def next_visit(self) -> int:
         """Return the number of the next visit of a state, in whichever container."""

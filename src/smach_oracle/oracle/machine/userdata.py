@@ -257,6 +257,9 @@ class WriteWatch:
         return keys
 
 
+# -- the userdata of a state
+
+
 def write_constants(userdata: smach.UserData, constants: Mapping[str, object]) -> None:
     """Write a state's constants before it runs, as the engine does. They stay."""
     for key, value in constants.items():

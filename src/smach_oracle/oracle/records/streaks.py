@@ -5,13 +5,15 @@ the next success, to a question, or to the end of the execution, unless one of i
 ended that.
 """
 
-from typing import Any, Dict, Iterable, List, Mapping, Optional
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Mapping, Optional, Tuple
 
 from ..decision.ways import StreakSoFar
 
 Told = Mapping[str, List[Any]]  # plain data by label
 
 
+@dataclass
 class OpenStreak:
     """A streak that goes on.
 
@@ -21,14 +23,13 @@ class OpenStreak:
     order, '' for none.
     """
 
-    def __init__(self, successes: int, began_s: float, visited: Iterable[str]) -> None:
-        self.successes = successes
-        self.began_s = began_s
-        self.visited = tuple(visited)
-        self.tried: List[str] = []
-        self.attempts = 0
-        self.leaves = False
-        self.moved = ''
+    successes: int
+    began_s: float
+    visited: Tuple[str, ...]
+    tried: List[str] = field(default_factory=list)
+    attempts: int = 0
+    moved: str = ''
+    leaves: bool = False
 
     def note(self, way: str, moved: bool = False) -> None:
         """Note that a way was gone. `moved`: before its turn in the menu's own order."""
@@ -42,47 +43,23 @@ class OpenStreak:
         return StreakSoFar(tuple(self.tried), self.attempts, minutes, self.moved)
 
 
-class Streaks:
+class Streaks(Dict[str, OpenStreak]):
     """The streaks of the states of one container."""
-
-    def __init__(self) -> None:
-        self._open: Dict[str, OpenStreak] = {}
 
     def of(self, label: str, successes: int) -> Optional[OpenStreak]:
         """Return that of a state, None where it is over. `successes`: of the state, in all."""
-        streak = self._open.get(label)
+        streak = self.get(label)
         return streak if streak is not None and streak.successes == successes else None
-
-    def begin(self, label: str, streak: OpenStreak) -> None:
-        """Have this as that of a state."""
-        self._open[label] = streak
-
-    def end(self, label: str) -> None:
-        """End that of a state."""
-        self._open.pop(label, None)
 
     def end_execution(self) -> None:
         """End all, but where a way has ended the execution."""
-        if self._open:
-            self._open = {label: each for label, each in self._open.items() if each.leaves}
-
-    def begin_trial(self) -> None:
-        """Forget everything."""
-        self._open = {}
+        for label in [label for label, each in self.items() if not each.leaves]:
+            del self[label]
 
     def told(self) -> Told:
         """Return them as plain data, for `take_over`."""
-        return {
-            label: [
-                each.successes,
-                each.began_s,
-                list(each.visited),
-                each.tried,
-                each.attempts,
-                each.moved,
-            ]
-            for label, each in self._open.items()
-        }
+        names = ('successes', 'began_s', 'visited', 'tried', 'attempts', 'moved')
+        return {label: [getattr(each, name) for name in names] for label, each in self.items()}
 
     def take_over(self, told: Told) -> None:
         """Go on from those of an execution that was stopped.
@@ -93,10 +70,15 @@ class Streaks:
         try:
             # earlier versions did not move ways
             for label, (successes, began_s, visited, tried, attempts, *moved) in told.items():
-                streak = OpenStreak(int(successes), float(began_s), map(str, visited))
-                streak.tried, streak.attempts = list(map(str, tried)), int(attempts)
-                streak.moved = str(moved[0]) if moved else ''
-                taken[label] = streak
+                taken[label] = OpenStreak(
+                    int(successes),
+                    float(began_s),
+                    tuple(map(str, visited)),
+                    list(map(str, tried)),
+                    int(attempts),
+                    str(moved[0]) if moved else '',
+                )
         except (AttributeError, TypeError, ValueError) as err:
             raise ValueError('cannot be read as streaks: {}'.format(err)) from err
-        self._open = taken
+        self.clear()
+        self.update(taken)

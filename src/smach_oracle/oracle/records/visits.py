@@ -1,5 +1,6 @@
 """Visits of states, how each counts, and which states a trial has begun. Pure, without smach."""
 
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Dict, List, NamedTuple, Tuple
 
@@ -21,6 +22,7 @@ class Visit(NamedTuple):
     result: VisitResult
 
 
+@dataclass(eq=False)
 class VisitMark:
     """The marks of one state in one trial.
 
@@ -30,41 +32,24 @@ class VisitMark:
     from which the machine may come here again: if it is guarded, it is not executed then.
     """
 
-    __slots__ = ('reached', 'executed', 'done', 'spent')
-
-    def __init__(self) -> None:
-        self.reached = 0
-        self.executed = 0
-        self.done = False
-        self.spent = False
+    reached: int = 0
+    executed: int = 0
+    done: bool = False
+    spent: bool = False
 
 
-class VisitMarks:
+class VisitMarks(Dict[str, VisitMark]):
     """The marks of one container, by label. They are kept where a state of the tree is guarded."""
 
-    def __init__(self) -> None:
-        self._by_label: Dict[str, VisitMark] = {}
-
-    def begin_trial(self) -> None:
-        """Forget everything."""
-        self._by_label = {}
-
-    def of(self, label: str) -> VisitMark:
-        """Return the mark of a state."""
-        mark = self._by_label.get(label)
-        if mark is None:
-            mark = self._by_label[label] = VisitMark()
+    def __missing__(self, label: str) -> VisitMark:
+        mark = self[label] = VisitMark()
         return mark
-
-    def take_over(self, label: str, mark: VisitMark) -> None:
-        """Go on with the mark of a state."""
-        self._by_label[label] = mark
 
     def told(self) -> List[Tuple[str, List[object]]]:
         """Return labels and marks as plain data."""
         return [
             (label, [mark.reached, mark.executed, mark.done, mark.spent])
-            for label, mark in list(self._by_label.items())
+            for label, mark in list(self.items())
         ]
 
 

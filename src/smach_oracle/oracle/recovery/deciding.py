@@ -123,7 +123,7 @@ def _streak(recovery: Recovery) -> OpenStreak:
     if streak is None:
         now_s = recovery.budget.work_time.now()
         streak = OpenStreak(record.totals[0], now_s, visited_on(recovery))
-        node.records.streaks.begin(record.label, streak)
+        node.records.streaks[record.label] = streak
     return streak
 
 

@@ -229,6 +229,9 @@ def tell_failure(
     )
 
 
+# -- failures that a later state reports
+
+
 class Announced(NamedTuple):
     """An earlier failure of another state, with what the visits say about it."""
 
@@ -263,11 +266,11 @@ def announced_by(
         text.format(record.label, outcome, route.target),
         route,
     )
-    context = _context(node, failed, visits[:place])
+    context = _context_then(node, failed, visits[:place])
     return Announced(failure, route, context, len(visits) - place)
 
 
-def _context(node: TreeNode, failed: StateRecord, before: Tuple[Visit, ...]) -> FailureContext:
+def _context_then(node: TreeNode, failed: StateRecord, before: Tuple[Visit, ...]) -> FailureContext:
     """Return what the visits before the failure, which is counted, say about it."""
     context = failure_context(node, failed, is_counted=True)
     states = (node.record(visit.state) for visit in reversed(before) if node.has(visit.state))

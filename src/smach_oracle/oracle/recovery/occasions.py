@@ -4,7 +4,7 @@ Which phases of a recovery do anything, what is counted and what is told follows
 """
 
 import enum
-from typing import Callable, NamedTuple, Optional
+from typing import NamedTuple, Optional
 
 import smach
 
@@ -13,7 +13,7 @@ from ..decision.policy import FailureContext
 from ..machine.resumed import Unfinished
 from ..records.events import FailureKind
 from .failure import Failure, in_words
-from .verdict import Verdict
+from .verdict import Departure
 
 
 class FirstStep(enum.Enum):
@@ -34,14 +34,6 @@ class Superseding(enum.Enum):
     RECORDS = 'records'  # in the history, where it is counted already
 
 
-class LowerVerdict(NamedTuple):
-    """A verdict on a failure in a container below, which was left for this one."""
-
-    verdict: Verdict
-    failed_path: str  # of the state that failed
-    why_not: Callable[[], str]  # what prevents it by now, '' where nothing does
-
-
 class Occasion(NamedTuple):
     """One reason to enter the oracle, after a visit of a state."""
 
@@ -55,7 +47,7 @@ class Occasion(NamedTuple):
     why: str = ''  # a person is asked, or the robot is not well, '' where a preempt came meanwhile
     keeps: bool = False  # without an answer the trial is kept for the next start
     answer: Optional[Answer] = None  # given while the state still ran
-    lower_verdict: Optional[LowerVerdict] = None
+    departure: Optional[Departure] = None  # of a container below, which was left for this one
     visits_since: int = 0  # since the state has failed
 
 
@@ -111,7 +103,7 @@ def ended_by_answer(
 def arrived(
     failure: Failure,
     context: FailureContext,
-    lower_verdict: LowerVerdict,
+    departure: Departure,
     outcome: str,
     is_own: bool,
 ) -> Occasion:
@@ -126,7 +118,7 @@ def arrived(
         outcome or 'left',
         FirstStep.OBEY,
         Superseding.TAKES_BACK if is_own else Superseding.RECORDS,
-        lower_verdict=lower_verdict,
+        departure=departure,
     )
 
 

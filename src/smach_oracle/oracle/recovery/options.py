@@ -201,6 +201,9 @@ Drawn = Mapping[str, Mapping[str, Optional[str]]]  # target by state and outcome
 _MOST_VISITED = 64  # states, to which a step back may lead
 
 
+# -- the menu
+
+
 def visited_before(node: TreeNode, label: str, since: int) -> Tuple[str, ...]:
     """Return the states that were visited before a state, the latest first, by name.
 

@@ -40,10 +40,19 @@ from .levels import (
     tell_decision,
     unnoticed,
 )
-from .occasions import FirstStep, LowerVerdict
+from .occasions import FirstStep
 from .recovery import Recovery
 from .stop import preempt_beside
-from .verdict import ContainerEnding, Foreseen, GiveUp, JumpTo, Supersede, Verdict, leads_to
+from .verdict import (
+    ContainerEnding,
+    Departure,
+    Foreseen,
+    GiveUp,
+    JumpTo,
+    Supersede,
+    Verdict,
+    leads_to,
+)
 
 # -- what comes before a decision
 
@@ -53,7 +62,7 @@ def obey_given(recovery: Recovery) -> Optional[Verdict]:
     occasion = recovery.occasion
     if occasion.answer is not None:
         return _obey_answer(recovery, occasion.answer)
-    return None if occasion.lower_verdict is None else _follow(recovery, occasion.lower_verdict)
+    return None if occasion.departure is None else _follow(recovery, occasion.departure)
 
 
 def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
@@ -76,7 +85,7 @@ def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
     return recovery.end_unaided() if recovery.budget.why_over() else None
 
 
-def _follow(recovery: Recovery, lower: LowerVerdict) -> Optional[Verdict]:
+def _follow(recovery: Recovery, lower: Departure) -> Optional[Verdict]:
     why_not = lower.why_not()
     return _ask_since(recovery, why_not) if why_not else lower.verdict
 
@@ -237,7 +246,7 @@ def _ask(recovery: Recovery, expert: Expert) -> Optional[Verdict]:
     around = node.execution.runs_around
     with standing_still(around), early_end.asking(), budget.work_time.paused():
         answer = Inquiry(recovery, expert, deadline_s).run()
-    node.records.streaks.end(recovery.record.label)
+    node.records.streaks.pop(recovery.record.label, None)
     question_id = recovery.question_id
     if recovery.stopped():
         if early_end.end_at_shutdown():

@@ -258,5 +258,5 @@ def _check(way: JumpPath) -> None:
             raise NotMet('{} runs at this time'.format(place.node.path))
     for place in way.entered_places[:-1]:
         guarded = place.node.settings_of(place.label).on_retry != ALLOW
-        if guarded and place.node.records.marks.of(place.label).done:
+        if guarded and place.node.records.marks[place.label].done:
             raise _not_repeated(place.path)

@@ -163,22 +163,14 @@ def _running_again(way: JumpPath) -> Tuple[str, ...]:
 
     They are those of the outermost Concurrence that is entered, be it the place or on the way down.
     """
-    for entered in _entered_on(way):
-        if isinstance(entered, smach.Concurrence):
-            return tuple(map(str, entered.get_children()))
-    return ()
-
-
-def _entered_on(way: JumpPath) -> Iterator[smach.State]:
-    """Yield the states that are entered, outermost first.
-
-    Containers between two places, such as a Concurrence in an Iterator, are among them.
-    """
-    for below in way.entered_places[1:]:
-        for link in links_to(below.node):
-            yield link.inner_container
     last = way.entered_places[-1]
-    yield states_of(last.node.machine)[last.label]
+    entered: List[smach.State] = [
+        link.inner_container for below in way.entered_places[1:] for link in links_to(below.node)
+    ]
+    for each in (*entered, states_of(last.node.machine)[last.label]):
+        if isinstance(each, smach.Concurrence):
+            return tuple(map(str, each.get_children()))
+    return ()
 
 
 # -- how the preconditions of the choices stand

@@ -1,6 +1,6 @@
 """A stop of the whole machine: which states have obeyed it, and who winds down since."""
 
-from typing import Optional, Sequence
+from typing import Optional
 
 from ..machine.tree_node import TreeNode
 from ..settings.failing_outcomes import is_preempted
@@ -14,13 +14,9 @@ def note_obeyed(node: TreeNode, label: str, cleans_within: bool = False) -> None
 
     :param cleans_within: the state is entered again, a machine with a clean-up of its own.
     """
-    if _asks_for_stop([node, *node.running_around()]):
+    outermost = [node, *node.running_around()][-1]
+    if outermost.machine.preempt_requested():
         node.records.note_obeyed(label, cleans_within)
-
-
-def _asks_for_stop(around: Sequence[TreeNode]) -> bool:
-    """Whether the outermost container is asked to stop, and not a part of it, which is left."""
-    return bool(around[-1].machine.preempt_requested())
 
 
 def note_end_under_preempt(node: TreeNode, label: str, outcome: Optional[str]) -> None:
@@ -54,7 +50,7 @@ def winds_down(node: TreeNode) -> bool:
     The oracle does not lead it back to its work, whatever its clean-up ends with. Its author may.
     """
     around = [node, *node.running_around()]
-    is_stop = _asks_for_stop(around)
+    is_stop = bool(around[-1].machine.preempt_requested())
     for each in around:
         if is_stop and each.machine.preempt_requested():
             return True

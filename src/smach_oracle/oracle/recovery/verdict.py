@@ -9,7 +9,7 @@ from typing import FrozenSet, NamedTuple, Optional, Sequence, Union
 import smach
 
 from ..decision.ways import WayResult
-from ..machine.places import JumpPath
+from ..machine.places import JumpPath, repeated_on, why_closed_on
 from ..machine.site import Route, route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
@@ -125,6 +125,42 @@ def arrives_at(verdict: Verdict) -> Optional[TreeNode]:
     if isinstance(verdict, JumpTo):
         return verdict.jump_path.meeting_node if verdict.jump_path.left_containers else None
     return verdict.level if isinstance(verdict, GiveUp) else None
+
+
+class Departure:
+    """A verdict on its way from the container of a failure to the level that follows it."""
+
+    def __init__(self, verdict: Verdict, arrives_at: TreeNode, failed_path: str) -> None:
+        """`failed_path`: that of the failed state."""
+        self.verdict = verdict
+        self.arrives_at = arrives_at
+        self.failed_path = failed_path
+        self.is_decided_again = isinstance(verdict, JumpTo) and verdict.chosen is not None
+        self._repeated = (
+            set(repeated_on(verdict.jump_path)) if isinstance(verdict, JumpTo) else set()
+        )
+
+    def why_not(self) -> str:
+        """Say what prevents it at its arrival that did not when it was decided, or '' if nothing.
+
+        What was preempted may have gone on for a while.
+        """
+        if not isinstance(self.verdict, JumpTo):
+            return ''
+        way = self.verdict.jump_path
+        closed = why_closed_on(way)
+        repeated = sorted(set(repeated_on(way)).difference(self._repeated))
+        if not (closed or repeated):
+            return ''
+        place = way.entered_places[-1].path
+        return 'cannot go to {}: {}'.format(
+            place,
+            closed or '{} was done while the way there was made free'.format(', '.join(repeated)),
+        )
+
+    def is_own(self, node: TreeNode) -> bool:
+        """Whether a container's own oracle has decided, as if its state had failed."""
+        return isinstance(self.verdict, JumpTo) and self.verdict.decided_by is node
 
 
 def leads_to(verdict: Verdict) -> str:

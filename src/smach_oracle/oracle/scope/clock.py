@@ -3,7 +3,7 @@
 import contextlib
 import threading
 import time
-from typing import Iterable, Iterator, Set, Tuple, Type
+from typing import Iterator, Set, Tuple, Type
 
 _LEAST_S = 0.05  # how soon a paused clock is looked at again
 
@@ -137,12 +137,3 @@ class PausableClock:
     def __reduce__(self) -> Tuple[Type['PausableClock'], Tuple[Clock]]:
         """Time does not travel with a copied or pickled machine."""
         return PausableClock, (Clock(),)
-
-
-@contextlib.contextmanager
-def paused(clocks: Iterable[PausableClock]) -> Iterator[None]:
-    """Let the time of several clocks stand still."""
-    with contextlib.ExitStack() as stack:
-        for clock in clocks:
-            stack.enter_context(clock.paused())
-        yield

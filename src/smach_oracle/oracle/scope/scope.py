@@ -11,7 +11,6 @@ import threading
 from enum import Enum, IntEnum
 from typing import (
     Callable,
-    ContextManager,
     Iterable,
     Iterator,
     Optional,
@@ -22,7 +21,7 @@ from typing import (
 )
 
 from .background_call import BackgroundCall
-from .clock import Bell, Clock, Flag, PausableClock, paused
+from .clock import Bell, Clock, Flag, PausableClock
 
 # how soon a wait sees a reason of which nobody tells it, such as `smach.is_shutdown`
 LOOK_S = 0.05
@@ -260,6 +259,11 @@ def inside(scope: Scope) -> Iterator[None]:
         _AROUND.reset(token)
 
 
-def standing_still(scopes: Iterable[Scope]) -> ContextManager[None]:
+@contextlib.contextmanager
+def standing_still(scopes: Iterable[Scope]) -> Iterator[None]:
     """Let the time of several scopes stand still."""
-    return paused(each.time for each in scopes if each.time is not None)
+    with contextlib.ExitStack() as stack:
+        for each in scopes:
+            if each.time is not None:
+                stack.enter_context(each.time.paused())
+        yield
