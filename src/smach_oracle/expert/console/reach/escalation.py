@@ -74,7 +74,7 @@ class Escalation:
     def take_back(self, due: DueCall) -> None:
         """A call was not made, since somebody had come. The next wait makes it."""
         waiting = self._waiting.get(due.key)
-        if waiting is not None:
+        if waiting is not None and due.person not in waiting.again:
             waiting.again.append(due.person)
 
     def not_reached(self, due: DueCall) -> None:

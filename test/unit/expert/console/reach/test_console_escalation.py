@@ -70,7 +70,8 @@ def test_a_question_that_is_gone_is_forgotten():
 def test_a_call_that_was_not_made_is_made_when_the_question_waits_again():
     calls = escalation()
     (due,) = calls.due(0, NOON, {'q': True})
-    calls.take_back(due)
+    for _ in range(2):  # by each way to reach a person
+        calls.take_back(due)
     assert called(calls, 1, waits=False) == []
     assert called(calls, 2) == ['ann']
     assert called(calls, 3) == []
