@@ -20,7 +20,7 @@ _LONGEST = 300
 _LATEST_S = 1e11
 UNTOLD = ('hello', 'watch', 'look', 'view')  # a page does these by itself
 # the arguments that say what a command was about, the first of them that there is
-_ABOUT = ('name', 'outcome', 'label', 'pattern', 'key', 'frame', 'text', 'path')
+_ABOUT = ('name', 'outcome', 'label', 'pattern', 'key', 'frame', 'path')
 
 
 class Acts:

@@ -13,7 +13,7 @@ from ..web.sections import PageSections
 from ..web.shifts import Shifts
 from .acts import Acts
 from .answer_times import AnsweredQuestion, AnswerTimes
-from .shift_journal import MOST_ANSWERED, ShiftJournal
+from .shift_journal import MOST_ANSWERED, ShiftJournal, why_not
 from .shift_rows import shift_rows
 
 
@@ -54,7 +54,7 @@ class People:
             else:
                 reply = CommandReply(False, 'This note is there no longer.')
         except OSError as err:
-            reply = CommandReply(False, 'The note could not be kept: {}'.format(err))
+            reply = CommandReply(False, 'Not done. {}'.format(why_not(err)))
         self._audit.record(person, command.name, reply.ok, reply.message, command.arguments)
         return reply
 

@@ -5,6 +5,7 @@ that was being written. Several consoles may share a file.
 """
 
 import contextlib
+import errno
 import fcntl
 import json
 import math
@@ -86,7 +87,7 @@ class ShiftJournal:
             self._write(record)
         except OSError as err:
             with self._lock:
-                self.problem = str(err)
+                self.problem = why_not(err)
                 self._take(record)
                 self._show()
 
@@ -104,17 +105,21 @@ class ShiftJournal:
             except FileNotFoundError:
                 return
             except OSError as err:
-                if self.problem == str(err):
+                if self.problem == why_not(err):
                     return
-                self.problem = str(err)
+                self.problem = why_not(err)
             self._show()
 
     def _write(self, record: Mapping[str, Any]) -> None:
         with self._lock:
             if self.path:
                 with self._locked() as stream:
-                    self.look()
-                    self._append(stream.fileno(), record)
+                    if os.fstat(stream.fileno()).st_size:
+                        self.look()
+                        text = _line(record)
+                    else:  # somebody has taken the file away
+                        text = self._text() + _line(record)
+                    self._append(stream.fileno(), text)
                     self._seen = _state_of(self.path)
             self._take(record)
             self._show()
@@ -128,21 +133,20 @@ class ShiftJournal:
         while True:
             with open(self.path, 'ab', opener=_plain) as stream:
                 fcntl.flock(stream, fcntl.LOCK_EX)
-                with contextlib.suppress(FileNotFoundError):
-                    if os.fstat(stream.fileno()).st_ino == os.stat(self.path).st_ino:
-                        yield stream
-                        return
+                if _is_at(stream.fileno(), self.path):
+                    yield stream
+                    return
 
-    def _append(self, descriptor: int, record: Mapping[str, Any]) -> None:
-        """Write a line behind the others, behind one that was torn by a crash, too."""
+    def _append(self, descriptor: int, text: bytes) -> None:
+        """Write lines behind the others, behind one that was torn by a crash, too."""
         size = os.fstat(descriptor).st_size
         with open(self.path, 'rb', opener=_plain) as stream:
             stream.seek(max(0, size - 1))
             torn = stream.read(1) not in (b'', b'\n')
-        line = (b'\n' if torn else b'') + _line(record)
+        text = (b'\n' if torn else b'') + text
         try:
-            if os.write(descriptor, line) != len(line):
-                raise OSError('the disk is full')
+            if os.write(descriptor, text) != len(text):
+                raise OSError(errno.ENOSPC, 'the disk is full')
             os.fsync(descriptor)
         except OSError:
             with contextlib.suppress(OSError):
@@ -157,10 +161,7 @@ class ShiftJournal:
             descriptor, draft = tempfile.mkstemp(suffix='.tmp', dir=folder)
             try:
                 with os.fdopen(descriptor, 'wb') as stream:
-                    for note in self._notes.values():
-                        stream.write(_line({'note': note.id, **note._asdict()}))
-                    for each in self._answered:
-                        stream.write(_line({'answered': list(each)}))
+                    stream.write(self._text())
                     stream.flush()
                     os.fsync(stream.fileno())
                 os.replace(draft, self.path)
@@ -168,6 +169,11 @@ class ShiftJournal:
                 os.remove(draft)
                 raise
             self._seen = _state_of(self.path)
+
+    def _text(self) -> bytes:
+        """Return the lines of all that is kept."""
+        notes = [_line({'note': note.id, **note._asdict()}) for note in self._notes.values()]
+        return b''.join(notes + [_line({'answered': list(each)}) for each in self._answered])
 
     def _read(self) -> None:
         """Take in the file as it is. A line that is no record of ours is passed over."""
@@ -210,8 +216,21 @@ def _plain(path: str, flags: int) -> int:
     descriptor = os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise OSError('{} is no plain file'.format(path))
+        raise OSError(errno.EINVAL, 'it is no plain file')
     return descriptor
+
+
+def why_not(err: OSError) -> str:
+    """Return the reason of an error of the file. It names no path: pages show it."""
+    return 'The file of notes: {}'.format(err.strerror or type(err).__name__)
+
+
+def _is_at(descriptor: int, path: str) -> bool:
+    """Whether an open file is still the one of a path, and was not replaced."""
+    try:
+        return os.fstat(descriptor).st_ino == os.stat(path).st_ino
+    except FileNotFoundError:
+        return False
 
 
 def _state_of(path: str) -> Tuple[int, ...]:
@@ -220,7 +239,8 @@ def _state_of(path: str) -> Tuple[int, ...]:
 
 
 def _line(record: Mapping[str, Any]) -> bytes:
-    return json.dumps(record, allow_nan=False).encode() + b'\n'
+    text = json.dumps(record, allow_nan=False, ensure_ascii=False)
+    return text.encode('utf-8', 'replace') + b'\n'
 
 
 def _note(record: Mapping[str, Any]) -> Optional[ShiftNote]:

@@ -2,11 +2,10 @@
 
 import json
 import os
-import random
 import signal
 import threading
-import time
 from datetime import datetime
+from types import SimpleNamespace
 
 import pytest
 from killed_machines import in_a_process
@@ -271,6 +270,10 @@ def test_a_pipe_a_link_a_folder_and_a_full_disk_are_said(tmp_path, monkeypatch):
         with pytest.raises(OSError):
             journal.write_note('ann', 'text')
         assert not journal.notes
+        people = People(journal, Shifts(), SimpleNamespace(record=lambda *_: None))
+        reply = people.carry_out(parse('{"id": 1, "do": "write_note", "text": "x"}'), ANN, 1)
+        assert not reply.ok
+        assert str(tmp_path) not in reply.message, 'pages are told of no path'
         journal.add_answered(AnsweredQuestion(5.0, 'ann', None, 2.0, None))
         assert (len(journal.answered), bool(journal.problem)) == (1, True)
     journal = ShiftJournal(str(tmp_path / 'shifts.jsonl'))
@@ -289,10 +292,8 @@ def test_consoles_that_share_a_file_lose_nothing_of_each_other(tmp_path):
     journals = [ShiftJournal(path) for _ in range(3)]
 
     def write(journal, name):
-        draw = random.Random(name)
         for number in range(25):
             journal.write_note(name, str(number))
-            time.sleep(draw.random() / 1000)  # so that they come in between each other
 
     threads = [
         threading.Thread(target=write, args=(journal, name))
@@ -316,9 +317,10 @@ def test_a_note_is_written_and_dropped_by_commands_which_are_recorded(tmp_path):
 
     people = People(ShiftJournal(str(tmp_path / 'shifts.jsonl')), Shifts(), Audit())
     sections = PageSections()
-    text = 'The <b>gripper</b> & "lid" ' + '☞' * 100
+    text = 'The <b>gripper</b> & "lid" ' + '☞🤖' * 100
     written = parse(json.dumps({'id': 1, 'do': 'write_note', 'text': text}))
     assert people.carry_out(written, ANN, 1).ok
+    assert ShiftJournal(str(tmp_path / 'shifts.jsonl')).notes[0].text == text
     people.write_sections(sections)
     (note,) = sections.get('people')['notes']
     assert (note['who'], note['text']) == ('ann', text)
@@ -352,3 +354,14 @@ def test_a_disk_that_hangs_holds_up_neither_events_nor_pages(tmp_path):
         assert done
     people.keep()
     assert len(people._journal.answered) == 1
+
+
+def test_a_file_that_is_taken_away_is_written_again(tmp_path):
+    path = tmp_path / 'shifts.jsonl'
+    journal = ShiftJournal(str(path))
+    journal.write_note('ann', 'first')
+    path.unlink()
+    journal.look()
+    journal.write_note('ann', 'second')
+    assert [note.text for note in journal.notes] == ['second', 'first']
+    assert [note.text for note in ShiftJournal(str(path)).notes] == ['second', 'first']

@@ -176,8 +176,7 @@ export class AlikeAnswer {
 
   cancel() { return false; }
 
-  /** @param {string} key */
-  press(key) { if (key === 'Enter') this.show(); }
+  press() {}
 }
 
 /**
