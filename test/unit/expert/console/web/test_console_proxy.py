@@ -1,4 +1,4 @@
-"""The console behind a reverse proxy: a real nginx with TLS, raw sockets, and forged headers."""
+"""The console behind reverse proxies: real ones with TLS, raw sockets, and forged headers."""
 
 import json
 import shutil
@@ -22,6 +22,7 @@ from smach_oracle.expert.console.web.proxies import PublicAddress, TrustedProxie
 from smach_oracle.expert.console.web.settings import read_settings
 from smach_oracle.oracle.errors import SettingsError
 
+CADDY = shutil.which('caddy')
 NGINX = shutil.which('nginx') or shutil.which('nginx', path='/usr/sbin')
 PUBLIC = PublicAddress.parse('~public_address', 'https://robots.example.org')
 # the example of doc/open_console.md, with folders and ports of the test
@@ -44,9 +45,21 @@ http {{
       proxy_set_header X-Forwarded-Proto $scheme;
       proxy_set_header Upgrade $http_upgrade;
       proxy_set_header Connection $connection_upgrade;
-      {more}
     }}
   }}
+}}
+"""
+CADDYFILE = """
+{{
+  admin off
+  auto_https disable_redirects
+  default_sni robots.example.org
+  storage file_system {folder}/caddy
+}}
+https://robots.example.org:{port} {{
+  bind 127.0.0.1
+  tls {folder}/own.pem {folder}/own.key
+  reverse_proxy 127.0.0.1:{console}
 }}
 """
 HIDDEN = 'GET /hidden HTTP/1.1\r\nHost: {host}\r\n\r\n'
@@ -218,13 +231,18 @@ class TestUntrusted(Behind):
         assert self.passed_on(Origin='https://robots.example.org').code == 403, 'it came by http'
 
 
-@pytest.mark.skipif(NGINX is None, reason='there is no nginx')
-class TestNginx(Behind):
-    more = ''
+class ThroughProxy(Behind):
+    """A real proxy with TLS in front of the console."""
+
+    configuration = ''
+
+    def command(self, path):
+        """What starts it with a file."""
+        raise NotImplementedError
 
     def setUp(self):
         super().setUp()
-        self.folder = tempfile.mkdtemp(prefix='console-nginx-')
+        self.folder = tempfile.mkdtemp(prefix='console-proxy-')
         self.addCleanup(shutil.rmtree, self.folder)
         subprocess.run(
             ['openssl', 'req', '-x509', '-newkey', 'rsa:2048', '-nodes', '-days', '2']
@@ -236,18 +254,16 @@ class TestNginx(Behind):
         )
         _, self.port = tornado.testing.bind_unused_port()
         _.close()
-        Path(self.folder, 'nginx.conf').write_text(
-            CONFIGURATION.format(
-                folder=self.folder, port=self.port, console=self.get_http_port(), more=self.more
+        file = self.folder + '/configuration'
+        Path(file).write_text(
+            self.configuration.format(
+                folder=self.folder, port=self.port, console=self.get_http_port()
             )
         )
-        self.nginx = subprocess.Popen(
-            [NGINX, '-p', self.folder, '-c', self.folder + '/nginx.conf'], stderr=subprocess.PIPE
-        )
-        self.addCleanup(self.nginx.stderr.close)
-        self.addCleanup(self.nginx.wait, 20)
-        self.addCleanup(self.nginx.terminate)
-        assert self.io_loop.run_sync(lambda: wait_in_loop(self.listens)), self.nginx.poll()
+        proxy = subprocess.Popen(self.command(file), stderr=subprocess.DEVNULL)
+        self.addCleanup(proxy.wait, 20)
+        self.addCleanup(proxy.terminate)
+        assert self.io_loop.run_sync(lambda: wait_in_loop(self.listens)), proxy.poll()
 
     def listens(self):
         try:
@@ -286,7 +302,7 @@ class TestNginx(Behind):
         cookie = cookies[0].split(': ')[1].split(';')[0] if cookies else ''
         return head, cookie, json.loads(said) if head.startswith('HTTP/1.1 200') else said
 
-    def test_a_person_signs_in_and_answers_through_it(self):
+    def signs_in_and_answers(self):
         head, cookie, info = self.asked()
         assert 'Secure' in head and info['signed_in'] is False
         own = {'Cookie': cookie, 'Origin': PUBLIC.origin, 'X_Xsrf': info['xsrf']}
@@ -309,21 +325,57 @@ class TestNginx(Behind):
         assert hello['ok'] and reply['ok']
         assert self.question_commands.done == [('claim', 'ann', 'operator')]
 
-    def test_no_request_is_smuggled_through_it(self):
+    def smuggles_nothing(self):
         for lines in DOUBTFUL + DROPPED:
             self.paths.clear()
             said = self.through(written('robots.example.org', lines))
-            # nginx may read a request behind a body, as anybody's. Then it has answered it itself
+            # a proxy may read a request behind a body, as anybody's. Then it answers it
             answers = said.count('HTTP/1.1 ')
             assert len(self.paths) <= answers, (lines, self.paths, said)
 
-    def test_two_people_on_one_connection_to_the_console_get_their_own_answers(self):
+    def mixes_up_nobody(self):
         for lines in DOUBTFUL + DROPPED:
             self.through(written('robots.example.org', lines))
             self.paths.clear()
             head, _, info = self.asked()
             assert head.startswith('HTTP/1.1 200') and info['signed_in'] is False, lines
             assert self.paths == ['/session'], lines
+
+
+@pytest.mark.skipif(NGINX is None, reason='there is no nginx')
+class TestNginx(ThroughProxy):
+    configuration = CONFIGURATION
+
+    def command(self, path):
+        return [NGINX, '-p', self.folder, '-c', path]
+
+    def test_a_person_signs_in_and_answers_through_it(self):
+        self.signs_in_and_answers()
+
+    def test_no_request_is_smuggled_through_it(self):
+        self.smuggles_nothing()
+
+    def test_two_people_on_one_connection_to_the_console_get_their_own_answers(self):
+        self.mixes_up_nobody()
+
+
+@pytest.mark.skipif(CADDY is None, reason='there is no Caddy')
+class TestCaddy(ThroughProxy):
+    """It keeps its connections to the console, and sends requests of many people on them."""
+
+    configuration = CADDYFILE
+
+    def command(self, path):
+        return [CADDY, 'run', '--adapter', 'caddyfile', '--config', path]
+
+    def test_a_person_signs_in_and_answers_through_it(self):
+        self.signs_in_and_answers()
+
+    def test_no_request_is_smuggled_through_it(self):
+        self.smuggles_nothing()
+
+    def test_two_people_on_one_connection_to_the_console_get_their_own_answers(self):
+        self.mixes_up_nobody()
 
 
 @pytest.mark.parametrize(
