@@ -27,7 +27,7 @@ BELOW = {
     'commands': ['options'],
     'console': ['on_call', 'open_console', 'console_security'],
     'expert': ['many_robots'],
-    'install': ['noetic', 'container'],
+    'install': ['noetic', 'container', 'stable'],
     'policies': ['ways'],
     'ros_interface': ['messages', 'services', 'actions'],
     'shared_autonomy': ['perception', 'own_interface'],
