@@ -69,7 +69,7 @@ def read_settings(get: GetParameter) -> ConsoleSettings:
     certificate, key = _path(get, 'certificate'), _path(get, 'private_key')
     if bool(certificate) != bool(key):
         raise SettingsError('~certificate', certificate or NONE, 'together with ~private_key')
-    public, proxies = _public(get), TrustedProxies(_names(get, 'trusted_proxy', 'IP addresses'))
+    public, proxies = _public(get), TrustedProxies(_names(get, '~trusted_proxy', 'IP addresses'))
     if proxies and public is None:
         raise SettingsError(
             '~public_address', NONE, 'the address by which browsers reach ~trusted_proxy'
@@ -109,17 +109,17 @@ def _public(get: GetParameter) -> Optional[PublicAddress]:
 
 
 def _hosts(get: GetParameter, remote: bool) -> List[str]:
-    names = _names(get, 'hosts', 'names')
+    names = _names(get, '~hosts', 'names')
     own = socket.gethostname()
     return names + ([own, own.split('.')[0], own.split('.')[0] + '.local'] if remote else [])
 
 
 def _names(get: GetParameter, name: str, what: str) -> List[str]:
-    value = get(name, [])
+    value = get(name[len('~') :], [])
     names = value.split() if isinstance(value, str) else value
     if not isinstance(names, list) or not all(isinstance(each, str) for each in names):
         raise SettingsError(
-            '~' + name, value, '{} separated by spaces, or a list of {}'.format(what, what)
+            name, value, '{} separated by spaces, or a list of {}'.format(what, what)
         )
     return [each for each in names if each != NONE]
 
