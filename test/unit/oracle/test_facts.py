@@ -58,6 +58,17 @@ def test_a_shutdown_is_no_inconsistent_machine():
     assert end_of(machine) is TrialEnd.SHUTDOWN
 
 
+def test_a_shutdown_before_the_first_state_is_no_inconsistent_machine():
+    machine = watched(Scripted())
+    smach.set_shutdown_check(lambda: True)
+    try:
+        assert machine.run() is None
+    finally:
+        smach.set_shutdown_check(lambda: False)
+    assert end_of(machine) is TrialEnd.SHUTDOWN
+    assert machine.of(EventKind.STATE_START) == []
+
+
 @pytest.mark.parametrize(
     'text, entered, end',
     [

@@ -177,7 +177,9 @@ def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseExcep
         return TrialEnd.ERROR
     if outcome is not None:
         return TrialEnd.OUTCOME
-    return TrialEnd.SHUTDOWN if node.engine.stepped else TrialEnd.INCONSISTENT
+    if node.engine.stepped or smach.is_shutdown():  # it may come before the first state
+        return TrialEnd.SHUTDOWN
+    return TrialEnd.INCONSISTENT
 
 
 def _leave_to_parent() -> None:

@@ -64,8 +64,8 @@ class TrialEnd(str, Enum):
     OUTCOME = 'outcome'
     ERROR = 'error'  # an exception left the machine
     STOPPED = 'stopped'  # Ctrl-C or SystemExit
-    SHUTDOWN = 'shutdown'  # while states ran. The machine has no outcome
-    INCONSISTENT = 'inconsistent'  # no state was entered
+    SHUTDOWN = 'shutdown'  # of the program. The machine has no outcome
+    INCONSISTENT = 'inconsistent'  # no state could be entered
     KEPT = 'kept'  # nobody has said how a stored trial goes on: it is asked again
 
 
