@@ -342,7 +342,7 @@ class ThroughProxy(Behind):
             assert self.paths == ['/session'], lines
 
 
-@pytest.mark.skipif(NGINX is None, reason='there is no nginx')
+@pytest.mark.skipif(NGINX is None, reason='there is no nginx, whose package starts a server')
 class TestNginx(ThroughProxy):
     configuration = CONFIGURATION
 
