@@ -33,6 +33,8 @@ def index(tmp_path_factory):
         timeout=600,
         check=True,
     )
+    shown = (top / 'html/_static/documentation_options.js').read_text(encoding='utf-8')
+    assert 'SHOW_SEARCH_SUMMARY: true' in shown, 'behind a web server it shows sentences'
     text = (top / 'html/searchindex.js').read_text(encoding='utf-8')
     return json.loads(text[text.index('{') : text.rindex('}') + 1])
 
