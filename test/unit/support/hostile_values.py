@@ -211,3 +211,10 @@ values = st.recursive(
     ),
     max_leaves=6,
 )
+
+
+def boxed(strategy: st.SearchStrategy) -> st.SearchStrategy:
+    """Each value in a list of its own. Hypothesis (6.130 does) looks at the class of what it has
+    drawn for a test, and some of these raise there.
+    """
+    return st.lists(strategy, min_size=1, max_size=1)

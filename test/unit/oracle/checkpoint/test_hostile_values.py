@@ -11,6 +11,7 @@ from hostile_values import (
     Pair,
     Rude,
     SlottedMore,
+    boxed,
     holding_itself,
     raising,
     shared,
@@ -90,8 +91,9 @@ def named(log):
 
 
 @settings(max_examples=300, **QUICK)
-@given(values)
-def test_no_value_raises_anything_but_that_it_cannot_be_stored(value):
+@given(boxed(values))
+def test_no_value_raises_anything_but_that_it_cannot_be_stored(box):
+    (value,) = box
     codecs = Codecs()
     try:
         text, whole, parts = codecs.encode(value, lambda name: None)
@@ -105,8 +107,9 @@ def test_no_value_raises_anything_but_that_it_cannot_be_stored(value):
 
 
 @settings(max_examples=60, **QUICK)
-@given(values)
-def test_a_machine_stores_all_that_stands_beside_a_value(tmp_path_factory, value):
+@given(boxed(values))
+def test_a_machine_stores_all_that_stands_beside_a_value(tmp_path_factory, box):
+    (value,) = box
     tmp_path = tmp_path_factory.mktemp('store')
     log = []
     for level in ('info', 'warn', 'debug', 'err'):

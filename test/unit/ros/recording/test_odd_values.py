@@ -3,7 +3,7 @@
 import genpy
 import pytest
 from geometry_msgs.msg import Point, PointStamped
-from hostile_values import Rude, holding_itself, raising, values
+from hostile_values import Rude, boxed, holding_itself, raising, values
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from recorded import events, finished
@@ -35,8 +35,9 @@ messages_and_values = st.one_of(values, wrong_messages)
 
 
 @settings(max_examples=300, **QUICK)
-@given(messages_and_values)
-def test_a_value_is_sent_or_named_as_unsent(value):
+@given(boxed(messages_and_values))
+def test_a_value_is_sent_or_named_as_unsent(box):
+    (value,) = box
     item = encode('odd', value)
     serialise(item)
     if item.encoding == UserdataItem.UNSENT:
@@ -57,8 +58,9 @@ def test_every_other_key_of_a_question_is_sent():
 
 
 @settings(max_examples=300, **QUICK)
-@given(messages_and_values)
-def test_a_value_is_stored_or_refused_with_a_reason(value):
+@given(boxed(messages_and_values))
+def test_a_value_is_stored_or_refused_with_a_reason(box):
+    (value,) = box
     offer_ros_codecs()
     codecs = Codecs(OFFERED)
     try:
@@ -70,8 +72,9 @@ def test_a_value_is_stored_or_refused_with_a_reason(value):
 
 
 @settings(max_examples=200, **QUICK)
-@given(messages_and_values)
-def test_viewers_get_all_other_keys(value):
+@given(boxed(messages_and_values))
+def test_viewers_get_all_other_keys(box):
+    (value,) = box
     left_out = []
     text = encode_userdata({'good': 1, 'odd': value}, lambda key, err: left_out.append(key))
     if left_out:
@@ -79,8 +82,9 @@ def test_viewers_get_all_other_keys(value):
 
 
 @settings(max_examples=200, **QUICK)
-@given(values)
-def test_an_event_becomes_a_message_whatever_it_holds(value):
+@given(boxed(values))
+def test_an_event_becomes_a_message_whatever_it_holds(box):
+    (value,) = box
     event = Event(
         EventKind.WARNING, 't', 0, 0.0, 'TOP', text=value, outcome=value, data={'odd': value}
     )
