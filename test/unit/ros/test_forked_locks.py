@@ -12,6 +12,7 @@ import pytest
 import smach_oracle
 from smach_oracle.experiment.cluster_launch import RUNNING_FILE, ClusterLaunch
 from smach_oracle.experiment.pool import alone_in
+from smach_oracle.expert.console.people.shift_journal import ShiftJournal
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
 from smach_oracle.oracle.records.folder_locks import folder_lock
 from smach_oracle.ros.disk import bag_folder
@@ -48,6 +49,11 @@ def catalogue(path):
     assert not BagCatalogue._is_written(
         SimpleNamespace(_folders=folders), str(path), SimpleNamespace(changed_ns=0)
     )
+    return path
+
+
+def shift_journal(path):
+    ShiftJournal(str(path)).write_note('ann', 'the arm is stowed')
     return path
 
 
@@ -99,6 +105,7 @@ WAYS = {
     'ros/recording/bag_writer.py': [bag_writer],
     'ros/disk/bag_folder.py': [disk],
     'expert/console/trials/bag_catalogue.py': [catalogue],
+    'expert/console/people/shift_journal.py': [shift_journal],
     'oracle/records/folder_locks.py': [rates_folder],
     'experiment/pool.py': [experiment],
     'experiment/cluster_launch.py': [cluster],

@@ -133,9 +133,12 @@ class ShiftJournal:
         while True:
             with open(self.path, 'ab', opener=_plain) as stream:
                 fcntl.flock(stream, fcntl.LOCK_EX)
-                if _is_at(stream.fileno(), self.path):
-                    yield stream
-                    return
+                try:
+                    if _is_at(stream.fileno(), self.path):
+                        yield stream
+                        return
+                finally:  # a child that was forked meanwhile would keep it
+                    fcntl.flock(stream, fcntl.LOCK_UN)
 
     def _append(self, descriptor: int, text: bytes) -> None:
         """Write lines behind the others, behind one that was torn by a crash, too."""
