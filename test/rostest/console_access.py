@@ -114,6 +114,9 @@ class Access(ConsolePage, unittest.TestCase):
         self.assertTrue(wait_for(lambda: len(self.told('answer')) == 2))
         browser.click('.follow-up [data-action=back]')
         self.focus_is_on('.question-row, .stage h2')
+        answered = 'return [...document.querySelectorAll(".question-row:not(.pending)")].length'
+        self.assertTrue(wait_for(lambda: not browser.run(answered)), 'it goes from the list')
+        self.focus_is_on('.question-row, .stage h2')
 
     def test_4_the_tree_of_machines_takes_the_arrow_keys(self):
         browser = self.browser

@@ -4,7 +4,7 @@ import { waits } from '../page/alerts.js';
 import { SETTLING_MS } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, setText, typing } from '../page/dom.js';
-import { moveFocus } from '../page/focus.js';
+import { focusIsFree, moveFocus } from '../page/focus.js';
 import { counted } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
@@ -118,12 +118,16 @@ class QuestionPanel {
     // a console that has just begun may not have heard of it yet
     const comes = this.open.some(({ key }) => key === this.missing);
     if (comes && !this.detail && this.app.current === 'questions') this.wanted = this.missing;
+    const focused = this.root.contains(document.activeElement);
     if (names.includes('questions')) this.arrive();
     if (names.includes('servers')) this.showServers();
     if (names.includes('reach')) this.unreached.show();
     if (names.includes('questions') || names.includes('onlookers')) this.showQueue();
     if (this.detail) this.detail.update(names);
-    else if (names.includes('questions')) this.showStage();
+    else {
+      if (names.includes('questions')) this.showStage();
+      if (focused && focusIsFree()) this.focusFirst(); // what had the focus has gone
+    }
   }
 
   showServers() {
@@ -226,6 +230,10 @@ class QuestionPanel {
     this.missing = '';
     this.showStage();
     this.app.went();
+    this.focusFirst();
+  }
+
+  focusFirst() {
     const first = this.queue.querySelector('.question-row') || this.stage.querySelector('h2');
     if (first instanceof HTMLElement) moveFocus(first);
   }
