@@ -31,13 +31,20 @@ ROWS = (Row(('lint', 'unit', 'ros', 'package', 'upstream'), 3), Row(('bench',), 
 GROUPS = sorted(group for row in ROWS for group in row.groups)
 # those with most to compute are begun first, so that none of them is left alone at the end
 LONGEST = (
+    'unit/simulation',
     'unit/oracle',
-    'package/test_build.py',
     'unit/ros',
+    'package/test_build.py',
+    'unit/borders',
+    'unit/pr2',
     'unit/house',
-    'unit/expert',
     'unit/analysis',
+    'unit/scripted_operator',
     'mypy',
+    'unit/expert',
+    'rostest/task_cluster',
+    'rostest/task_experiment',
+    'rostest/console_teleoperation',
 )
 
 
