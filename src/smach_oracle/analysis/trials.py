@@ -121,7 +121,7 @@ def _judged(trials: Iterable[TrialSummary]) -> Iterator[TrialSummary]:
     """Yield the trials, each with its truth."""
     truths = TruthFiles()
     for trial in trials:
-        truth = truths.of(trial.replicate, trial.cause.seed if trial.cause else None)
+        truth = trial.cause and truths.of(trial.replicate, trial.cause.seed)
         yield trial._replace(truth=truth) if truth else trial
 
 

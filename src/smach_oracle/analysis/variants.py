@@ -4,6 +4,7 @@ A variant is one of the ways in which an experiment runs the same trials, such a
 the oracle.
 """
 
+from operator import attrgetter
 from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from .counting.trial_summary import TrialSummary
@@ -19,10 +20,10 @@ ENDED_IN_FAILURE = 'ended in failure'
 OTHER_END = 'other end'
 TRUE_SUCCESS = 'true success'
 _BY_EVENTS: Tuple[Tuple[str, Callable[[TrialSummary], int]], ...] = (
-    ('failures of states', lambda trial: trial.failures),
-    (RECOVERIES, lambda trial: trial.recoveries),
-    (QUESTIONS, lambda trial: trial.questions),
-    (ANSWERED, lambda trial: trial.answered),
+    ('failures of states', attrgetter('failures')),
+    (RECOVERIES, attrgetter('recoveries')),
+    (QUESTIONS, attrgetter('questions')),
+    (ANSWERED, attrgetter('answered')),
     (NOT_ANSWERED, lambda trial: trial.questions - trial.answered),
 )
 _ENDINGS = {
@@ -241,8 +242,9 @@ def _by_events(
     trials: Sequence[TrialSummary],
     parts: Sequence[Sequence[TrialSummary]],
 ) -> Count:
-    count = make_count(name, lambda trial: number(trial) > 0, trials, parts)
-    return count._replace(events=sum(map(number, trials)))
+    numbers = [list(map(number, part)) for part in parts]
+    count = _count(name, [len(part) - part.count(0) for part in numbers], trials, parts)
+    return count._replace(events=sum(map(sum, numbers)))
 
 
 def _ended(ending: TrialEnding) -> Callable[[TrialSummary], bool]:
@@ -263,7 +265,15 @@ def make_count(
 
     There is at least one. `parts`: the same by replicate.
     """
-    by_part = [sum(map(happened, part)) for part in parts]
+    return _count(name, [sum(map(happened, part)) for part in parts], trials, parts)
+
+
+def _count(
+    name: str,
+    by_part: Sequence[int],
+    trials: Sequence[TrialSummary],
+    parts: Sequence[Sequence[TrialSummary]],
+) -> Count:
     number = sum(by_part)
     shares = [one / len(part) for one, part in zip(by_part, parts)]
     return Count(

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from smach_oracle.analysis.bag_events import EventReader, RecordedCause
 from smach_oracle.analysis.counting import bag_counts, kept_counts
 from smach_oracle.analysis.counting.kept_counts import FILE, KEPT_DAYS
-from smach_oracle.analysis.counting.summary_text import summaries_in, text_of
+from smach_oracle.analysis.counting.summary_text import shared_by, summaries_in_all, text_of
 from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import load_by_state, load_trials
@@ -198,6 +198,20 @@ def test_a_file_that_another_count_writes_is_waited_for_shortly(cache, folder, m
     assert len(rows_in(cache)) == BAGS
 
 
+def test_a_text_that_bags_share_and_that_is_gone_has_them_read_again(cache, folder, read):
+    first = load_trials([folder])
+    connection = sqlite3.connect(str(cache))
+    assert connection.execute('DELETE FROM shared').rowcount == 1
+    connection.commit()
+    connection.close()
+    read.clear()
+    assert load_trials([folder]) == first
+    assert len(read) == bag_counts.GROUP  # which keeps it again
+    read.clear()
+    assert load_trials([folder]) == first
+    assert not read
+
+
 def test_what_is_old_is_dropped(cache, folder, monkeypatch):
     load_trials([folder])
     now = time.time()
@@ -332,4 +346,6 @@ summaries = st.builds(
 
 @given(st.lists(summaries, max_size=3))
 def test_a_text_says_all_of_some_summaries(found):
-    assert summaries_in(text_of(found), 'a.bag') == found
+    text = text_of(found)
+    shared = shared_by(dict(text.shared).__getitem__)
+    assert summaries_in_all({'a.bag': text.text}, shared) == {'a.bag': found}

@@ -77,15 +77,18 @@ def _shared(
 def _kept(counting: Counting, begin_others: BeginCount, closing: ExitStack) -> BeginCount:
     """Return what takes the counts that are kept, has the others counted, and keeps these."""
     from .kept_counts import KeptCounts  # with a database: only where there are many bags
-    from .summary_text import summaries_in_all, text_of
+    from .summary_text import shared_by, summaries_in_all, text_of
 
     kept = KeptCounts(counting.rule)
+    shared = shared_by(kept.shared)
     closing.callback(kept.close)
 
     def begin(paths: Sequence[str]) -> Callable[[], List[CountedBag]]:
         keys = {path: key for path, key in ((path, kept.key_of(path)) for path in paths) if key}
         texts = kept.texts(list(keys.values()))
-        read = summaries_in_all({path: texts[key] for path, key in keys.items() if key in texts})
+        read = summaries_in_all(
+            {path: texts[key] for path, key in keys.items() if key in texts}, shared
+        )
         known = {
             path: CountedBag(path, [(summary, None) for summary in found])
             for path, found in read.items()

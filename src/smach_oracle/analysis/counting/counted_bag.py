@@ -1,6 +1,6 @@
 """The trials of one bag, counted."""
 
-from typing import Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Any, Callable, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.failure_rule import FailureRule
@@ -9,6 +9,9 @@ from ..bag_events import BagError, EventReader
 from .trial_summary import TrialSummary
 from .trials_of_bags import trials_of
 
+if TYPE_CHECKING:
+    from .summary_text import SummaryText
+
 
 class CountedBag(NamedTuple):
     """The trials of one bag, or why it cannot be used."""
@@ -16,7 +19,7 @@ class CountedBag(NamedTuple):
     path: str
     trials: Sequence[Tuple[TrialSummary, Any]] = ()  # each with what was taken of it
     reason: str = ''
-    text: str = ''  # of its summaries, where that is known
+    text: Optional['SummaryText'] = None  # of its summaries, where that is known
 
 
 class Counting(NamedTuple):

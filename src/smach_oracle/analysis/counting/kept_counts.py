@@ -12,14 +12,17 @@ import sqlite3
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple
+from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple, Union
 
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.user_cache import cache_folder
 
+from .summary_text import SummaryText
+
 FILE = 'counts.sqlite'
 KEPT_DAYS = 90
 _SETTLED_NS = 2 * 10**9  # a file that was changed just now may change again within the same tick
+_TABLES = ('counts', 'shared')  # of bags by key, and what these share by name
 _BUSY_S = 0.5  # another count may be writing
 _DAY_S = 86400
 _PACKAGE = Path(__file__).resolve().parents[2]
@@ -39,10 +42,11 @@ class KeptCounts:
             self._path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
             # a transaction begins at the first text that is new
             self._open = sqlite3.connect(str(self._path), timeout=_BUSY_S)
-            self._open.execute(
-                'CREATE TABLE IF NOT EXISTS counts '
-                '(key BLOB PRIMARY KEY, day INTEGER, text TEXT) WITHOUT ROWID'
-            )
+            for table in _TABLES:
+                self._open.execute(
+                    'CREATE TABLE IF NOT EXISTS {} '
+                    '(key BLOB PRIMARY KEY, day INTEGER, text TEXT) WITHOUT ROWID'.format(table)
+                )
 
     def key_of(self, path: str) -> Optional[bytes]:
         """Return the key of a bag, None where its file is not there, or was changed just now."""
@@ -71,12 +75,25 @@ class KeptCounts:
                 found.update(self._open.execute(asked.format(marks), keys))
         return found
 
-    def keep(self, texts: Mapping[bytes, str]) -> None:
+    def shared(self, name: str) -> str:
+        """Return a text that others name.
+
+        :raises LookupError: where it is not kept.
+        """
+        with self._usable():
+            if self._open is not None:
+                asked = 'SELECT text FROM shared WHERE key = ?'
+                for (text,) in self._open.execute(asked, (name,)):
+                    return str(text)
+        raise LookupError(name)
+
+    def keep(self, texts: Mapping[bytes, SummaryText]) -> None:
         """Keep some texts by their keys, once it is closed."""
+        shared = {part for text in texts.values() for part in text.shared}
         with self._usable():
             if self._open is not None and texts:
-                rows = [(key, self._today, text) for key, text in texts.items()]
-                self._open.executemany('INSERT OR REPLACE INTO counts VALUES (?, ?, ?)', rows)
+                self._keep('counts', [(key, each.text) for key, each in texts.items()])
+                self._keep('shared', list(shared))
 
     def close(self) -> None:
         """Write what is new. What is old goes then."""
@@ -84,9 +101,17 @@ class KeptCounts:
             if self._open is not None:
                 if self._open.in_transaction:
                     last_day = self._today - KEPT_DAYS
-                    self._open.execute('DELETE FROM counts WHERE day < ?', (last_day,))
+                    for table in _TABLES:
+                        gone = 'DELETE FROM {} WHERE day < ?'.format(table)
+                        self._open.execute(gone, (last_day,))
                 self._open.commit()
                 self._open.close()
+
+    def _keep(self, table: str, texts: Sequence[Tuple[Union[bytes, str], str]]) -> None:
+        if self._open is not None:
+            rows = [(key, self._today, text) for key, text in texts]
+            kept = 'INSERT OR REPLACE INTO {} VALUES (?, ?, ?)'.format(table)
+            self._open.executemany(kept, rows)
 
     @contextmanager
     def _usable(self) -> Iterator[None]:

@@ -12,7 +12,7 @@ from typing import Any, Callable, Deque, List, NamedTuple, Optional, Sequence
 
 from ..bag_events import EventReader
 from .counted_bag import BeginCount, CountedBag, Counting, count_bag
-from .summary_text import summaries_in_all, text_of
+from .summary_text import SummaryText, shared_by, summaries_in_all, text_of
 
 _GIVEN_AHEAD = 2  # groups for each process: it has the next one when it is done with one
 _LENGTH = struct.Struct('<Q')
@@ -25,7 +25,7 @@ _Received = List['_SentBag']
 class _SentBag(NamedTuple):
     """A counted bag without its path. It has one text for its summaries, which is quick to read."""
 
-    text: str
+    text: Optional[SummaryText]  # None: there is a reason
     taken: Sequence[Any]
     reason: str
 
@@ -173,7 +173,10 @@ class _Process:
 
 def _read(paths: Sequence[str], received: _Received) -> List[CountedBag]:
     texts = {path: sent.text for path, sent in zip(paths, received) if sent.text}
-    summaries = summaries_in_all(texts)
+    shared = dict(part for text in texts.values() for part in text.shared)
+    summaries = summaries_in_all(
+        {path: text.text for path, text in texts.items()}, shared_by(shared.__getitem__)
+    )
     return [
         CountedBag(
             path,
@@ -200,7 +203,7 @@ def _count_all(numbers: int, results: int, counting: Counting, paths: Sequence[s
 
 def _sent(bag: CountedBag) -> _SentBag:
     summaries = [summary for summary, _ in bag.trials]
-    text = '' if bag.reason else text_of(summaries)
+    text = None if bag.reason else text_of(summaries)
     return _SentBag(text, [taken for _, taken in bag.trials], bag.reason)
 
 

@@ -1,12 +1,14 @@
 """The summaries of a bag's trials as text, and back. Pure.
 
-What many trials share, such as the settings, is a text of its own: it is read once for all of them.
+What many trials share, such as the settings, is a text of its own, which the others name: it is
+kept once, sent once, and read once.
 """
 
+import hashlib
 import json
 from contextlib import suppress
 from functools import lru_cache
-from typing import Any, Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Sequence, Tuple
 
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
@@ -25,7 +27,21 @@ _encode = json.JSONEncoder(separators=(',', ':')).encode
 _MOST_TEXTS = 100
 _NO_TEXT = (LookupError, TypeError, ValueError)  # what another text raises
 # by the identity of settings and origin, and by the rule
-_texts: Dict[Tuple[int, int, FailureRule], Tuple['_Shared', str]] = {}
+_texts: Dict[Tuple[int, int, FailureRule], Tuple['_Shared', 'SharedText']] = {}
+
+
+class SharedText(NamedTuple):
+    """A text that the texts of many bags name."""
+
+    name: str
+    text: str
+
+
+class SummaryText(NamedTuple):
+    """The summaries of one bag's trials, which do not name the bag."""
+
+    text: str
+    shared: Tuple[SharedText, ...]  # that it names
 
 
 class _Shared(NamedTuple):
@@ -36,47 +52,52 @@ class _Shared(NamedTuple):
     rule: FailureRule
 
 
-def text_of(summaries: Sequence[TrialSummary]) -> str:
-    """Return the text of some summaries that have no truth yet. It does not name their bags."""
-    return _encode([_data_of(each) for each in summaries])
+SharedBy = Callable[[str], _Shared]  # by name
 
 
-def summaries_in(text: str, path: str) -> List[TrialSummary]:
-    """Return the summaries in a text that `text_of` made. `path`: of the bag that they are from."""
-    return [_summary(each, path) for each in json.loads(text)]
+def text_of(summaries: Sequence[TrialSummary]) -> SummaryText:
+    """Return the text of some summaries that have no truth yet."""
+    shared = [_text_of_shared(_Shared(each.settings, each.origin, each.rule)) for each in summaries]
+    data = [_data_of(trial, part.name) for trial, part in zip(summaries, shared)]
+    return SummaryText(_encode(data), tuple(set(shared)))
 
 
-def summaries_in_all(texts: Mapping[str, str]) -> Dict[str, List[TrialSummary]]:
+def shared_by(texts: Callable[[str], str]) -> SharedBy:
+    """Return what reads shared texts. `texts`: by name. It may raise LookupError."""
+    return lru_cache(maxsize=_MOST_TEXTS)(lambda name: _shared_in(texts(name)))
+
+
+def summaries_in_all(texts: Mapping[str, str], shared: SharedBy) -> Dict[str, List[TrialSummary]]:
     """Return the summaries in some texts, by the path of the bag. To read all at once is quicker.
 
-    A text that `text_of` did not make is left out.
+    A text that `text_of` did not make is left out, and one that names a text that is not there.
     """
     try:
         lists = json.loads('[{}]'.format(','.join(texts.values())))
         if len(lists) == len(texts):
             return {
-                path: [_summary(each, path) for each in found] for path, found in zip(texts, lists)
+                path: [_summary(each, (path,), shared) for each in found]
+                for path, found in zip(texts, lists)
             }
     except _NO_TEXT:
         pass
     found = {}
     for path, text in texts.items():
         with suppress(*_NO_TEXT):
-            found[path] = summaries_in(text, path)
+            found[path] = [_summary(each, (path,), shared) for each in json.loads(text)]
     return found
 
 
-def _data_of(trial: TrialSummary) -> List[Any]:
+def _data_of(trial: TrialSummary, shared: str) -> List[Any]:
     data: List[Any] = list(trial)
     data[_ENDING], data[_BAGS] = trial.ending.value, None
-    data[_SETTINGS] = _text_of_shared(_Shared(trial.settings, trial.origin, trial.rule))
-    data[_ORIGIN] = data[_RULE] = None
+    data[_SETTINGS], data[_ORIGIN], data[_RULE] = shared, None, None
     return data
 
 
-def _summary(data: List[Any], path: str) -> TrialSummary:
-    data[_ENDING], data[_BAGS] = _ENDINGS[data[_ENDING]], (path,)
-    data[_SETTINGS], data[_ORIGIN], data[_RULE] = _shared(data[_SETTINGS])
+def _summary(data: List[Any], bags: Tuple[str], shared: SharedBy) -> TrialSummary:
+    data[_ENDING], data[_BAGS] = _ENDINGS[data[_ENDING]], bags
+    data[_SETTINGS], data[_ORIGIN], data[_RULE] = shared(data[_SETTINGS])
     data[_FAILURES], data[_INPUTS] = _pairs(data[_FAILURES]), _pairs(data[_INPUTS])
     if data[_CAUSE] is not None:
         seed, task, kinds, details = data[_CAUSE]
@@ -84,19 +105,21 @@ def _summary(data: List[Any], path: str) -> TrialSummary:
     return TrialSummary._make(data)
 
 
-def _text_of_shared(shared: _Shared) -> str:
+def _text_of_shared(shared: _Shared) -> SharedText:
     """Return the text of what many trials share. The same objects are encoded once."""
     key = (id(shared.settings), id(shared.origin), shared.rule)
     known = _texts.get(key)
     if known is None:
         if len(_texts) == _MOST_TEXTS:
             _texts.clear()
-        known = _texts[key] = shared, _encode(shared)  # it holds them, so that none is another
+        text = _encode(shared)
+        name = hashlib.blake2b(text.encode(), digest_size=16).hexdigest()
+        # it holds what is shared, so that none is another
+        known = _texts[key] = shared, SharedText(name, text)
     return known[1]
 
 
-@lru_cache(maxsize=100)
-def _shared(text: str) -> _Shared:
+def _shared_in(text: str) -> _Shared:
     settings, origin, (words, version) = json.loads(text)
     rule = FailureRule(None if words is None else tuple(words), version)
     return _Shared(_pairs(settings), _pairs(origin), rule)
