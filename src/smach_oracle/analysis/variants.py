@@ -244,7 +244,7 @@ def _by_events(
 ) -> Count:
     numbers = [list(map(number, part)) for part in parts]
     count = _count(name, [len(part) - part.count(0) for part in numbers], trials, parts)
-    return count._replace(events=sum(map(sum, numbers)))
+    return count._replace(events=sum(sum(part) for part in numbers))
 
 
 def _ended(ending: TrialEnding) -> Callable[[TrialSummary], bool]:
