@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import pytest
 from house import ROOT, shown
@@ -9,6 +11,8 @@ from house import ROOT, shown
 (STATIC,) = (path.parent for path in (ROOT / 'src').rglob('static/index.html'))
 SCRIPTS = sorted((STATIC / 'js').rglob('*.js'))
 DECLARATIONS = sorted((STATIC / 'js').rglob('*.d.ts'))
+WRITTEN = STATIC / 'js/server.d.ts'  # by doc/write_page_types.py
+FROM_PYTHON = sorted((STATIC.parent / 'shapes').glob('*.py'))
 FILES = SCRIPTS + DECLARATIONS + sorted(STATIC.rglob('*.css')) + sorted(STATIC.rglob('*.html'))
 MOST_COLUMNS = 100
 MOST_LINES = 400
@@ -68,6 +72,23 @@ def test_there_are_scripts():
     assert len(SCRIPTS) > 40 and len(DECLARATIONS) > 1
 
 
+def test_the_shapes_of_what_the_server_sends_are_those_of_the_python_types():
+    checked = subprocess.run(
+        [sys.executable, str(ROOT / 'doc/write_page_types.py'), '--check'],
+        stdout=subprocess.PIPE,
+        timeout=60,
+        check=False,
+    )
+    assert checked.returncode == 0, checked.stdout.decode()
+
+
+def test_every_shape_in_python_reaches_the_scripts():
+    classes = re.compile(r'^(?:class )?([A-Z]\w+)View(?:\(| = )', re.MULTILINE)
+    names = {name for path in FROM_PYTHON for name in classes.findall(text_of(path))}
+    declared = set(re.findall(r'^export interface (\w+)', text_of(WRITTEN), re.MULTILINE))
+    assert len(names) > 60 and names <= declared
+
+
 def test_every_line_has_at_most_100_columns():
     lines = [
         (len(line), '{}:{}'.format(shown(path), number))
@@ -89,7 +110,7 @@ def test_no_script_asks_which_words_a_text_has():
 
 
 def test_files_functions_and_folders_are_short():
-    lengths = {shown(path): len(text_of(path).splitlines()) for path in FILES}
+    lengths = {shown(path): len(text_of(path).splitlines()) for path in FILES if path != WRITTEN}
     assert not {name: length for name, length in lengths.items() if length > MOST_LINES}
     found = [(lines, head, shown(path)) for path in SCRIPTS for head, lines in functions(path)]
     assert len(found) > 400, 'they are found'

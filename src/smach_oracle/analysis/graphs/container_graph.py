@@ -10,6 +10,8 @@ from typing import Any, Dict, FrozenSet, Iterable, List, NamedTuple, Optional, S
 
 from smach_oracle.oracle.settings.failing_outcomes import is_preempted
 
+from .drawn_graph import GraphEdgeView, GraphView, Place, Spot, TransitionCount
+
 MOST_STATES = 2000  # of a container. One with more is refused
 MOST_EDGES = 20_000  # likewise
 MOST_DRAWN = 150  # states. dot would take minutes for more, and nobody could read the drawing
@@ -66,9 +68,6 @@ class ContainerGraph(NamedTuple):
         return is_preempted(edge.outcome) and edge.target in self.outcomes
 
 
-Point = Tuple[float, float]
-
-
 class GraphLayout(NamedTuple):
     """The places of states and transitions, in pixels from the upper left corner."""
 
@@ -76,7 +75,7 @@ class GraphLayout(NamedTuple):
     height: float
     nodes: Dict[str, Tuple[float, float, float, float]]  # id -> centre x, y, width, height
     # id -> Bezier points, label
-    edges: Dict[str, Tuple[List[Point], Optional[Point]]]
+    edges: Dict[str, Tuple[List[Spot], Optional[Spot]]]
 
 
 def make_structure(
@@ -172,18 +171,18 @@ def read_layout(text: str) -> GraphLayout:
 
 def drawing(
     structure: ContainerGraph, layout: Optional[GraphLayout], nested: Iterable[str]
-) -> Dict[str, Any]:
+) -> GraphView:
     """The section of a graph: plain data for the page. Positions only where there is a layout.
 
     :param nested: labels of the states that are containers themselves.
     """
     names = _names(structure)
     inner = set(nested)
-    data: Dict[str, Any] = {
+    return {
         'path': structure.path,
         'oracle': structure.oracle,
         'drawn': layout is not None,
-        'size': [layout.width, layout.height] if layout else None,
+        'size': (layout.width, layout.height) if layout else None,
         'states': [
             {'label': label, 'nested': label in inner, 'at': _place(layout, names[label])}
             for label in structure.states
@@ -191,28 +190,25 @@ def drawing(
         'outcomes': [
             {'label': label, 'at': _place(layout, names[label])} for label in structure.outcomes
         ],
-        'edges': [],
+        'edges': [
+            _edge_view(edge, layout, 'e{}'.format(number))
+            for number, edge in enumerate(structure.edges)
+        ],
         'bundled': structure.bundled,
         'refused': structure.refused,
     }
-    for number, edge in enumerate(structure.edges):
-        points, label = _drawn_edge(layout, 'e{}'.format(number))
-        data['edges'].append(
-            {
-                'from': edge.source,
-                'outcome': edge.outcome,
-                'to': edge.target,
-                'points': [coordinate for point in points for coordinate in point],
-                'label': label,
-            }
-        )
-    return data
 
 
-def _drawn_edge(layout: Optional[GraphLayout], name: str) -> Tuple[List[Point], Optional[Point]]:
-    """Points and place of the label of an edge. None where it is not laid out."""
-    edge = layout.edges.get(name) if layout else None
-    return edge if edge else ([], None)
+def _edge_view(edge: GraphEdge, layout: Optional[GraphLayout], name: str) -> GraphEdgeView:
+    drawn = layout.edges.get(name) if layout else None
+    points, label = drawn or ([], None)
+    return {
+        'from': edge.source,
+        'outcome': edge.outcome,
+        'to': edge.target,
+        'points': [coordinate for point in points for coordinate in point],
+        'label': label,
+    }
 
 
 def _names(structure: ContainerGraph) -> Dict[str, str]:
@@ -222,12 +218,12 @@ def _names(structure: ContainerGraph) -> Dict[str, str]:
     return {label: 'n{}'.format(number) for number, label in enumerate(labels)}
 
 
-def _place(layout: Optional[GraphLayout], name: str) -> Optional[List[float]]:
-    return (
-        [round(number, 1) for number in layout.nodes[name]]
-        if layout and name in layout.nodes
-        else None
-    )
+def _place(layout: Optional[GraphLayout], name: str) -> Optional[Place]:
+    found = layout.nodes.get(name) if layout else None
+    if found is None:
+        return None
+    x, y, width, height = found
+    return round(x, 1), round(y, 1), round(width, 1), round(height, 1)
 
 
 def _node(data: Dict[str, Any], top: float) -> Tuple[float, float, float, float]:
@@ -240,9 +236,9 @@ def _node(data: Dict[str, Any], top: float) -> Tuple[float, float, float, float]
     )
 
 
-def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Point], Optional[Point]]:
+def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Spot], Optional[Spot]]:
     """The spline's points, its arrow's tip at the end."""
-    tip: List[Point] = []
+    tip: List[Spot] = []
     points = []
     for part in data['pos'].split():
         if part.startswith('e,'):
@@ -254,25 +250,27 @@ def _edge(data: Dict[str, Any], top: float) -> Tuple[List[Point], Optional[Point
     ] if points else None
 
 
-def _point(text: str, top: float) -> Point:
+def _point(text: str, top: float) -> Spot:
     x, y = (float(number) for number in text.split(','))
     return round(x, 1), round(top - y, 1)
 
 
-def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[List[Any]]:
+def shares(counts: Iterable[Tuple[str, str, str, int]]) -> List[TransitionCount]:
     """Rows of [source, outcome, target, times, share of all that left the source]."""
     rows = list(counts)
     totals: Dict[str, int] = Counter()
     for source, _, _, times in rows:
         totals[source] += times
     return [
-        [source, outcome, target, times, round(times / totals[source], 4)]
+        (source, outcome, target, times, round(times / totals[source], 4))
         for source, outcome, target, times in rows
         if totals[source]
     ]
 
 
-def structure_from_counts(path: str, labels: List[str], counts: List[List[Any]]) -> ContainerGraph:
+def structure_from_counts(
+    path: str, labels: List[str], counts: List[TransitionCount]
+) -> ContainerGraph:
     """Return a container of which only its labels and the transitions taken are known.
 
     :param counts: rows as of `shares`.

@@ -41,7 +41,7 @@ class SeenContainer:
     def graph(self, path: str) -> ContainerGraph:
         """Return its graph."""
         return structure_from_counts(
-            path, list(self._labels), [[*edge, times, 0.0] for edge, times in self._taken.items()]
+            path, list(self._labels), [(*edge, times, 0.0) for edge, times in self._taken.items()]
         )
 
 

@@ -30,6 +30,7 @@ from ..commands.commands import CommandReply, PageCommand
 from ..commands.marking import FRESH
 from ..sensors.clouds import Cloud, CloudError, encode_points, thinned
 from ..sensors.images import cv2
+from ..shapes.sensors import MarkedCloudView, MarkedView
 from ..web.audit import Person
 from .interface_actions import action_of
 from .question_commands import CommandWorker, items
@@ -117,9 +118,9 @@ class InterfaceCommands:
         return CommandReply(answer.ok, answer.message)
 
 
-def marked_view(answer: SegmentObjectResponse) -> Dict[str, Any]:
+def marked_view(answer: SegmentObjectResponse) -> MarkedView:
     """A segmentation for the page: outlines of the mask (px), place and size of the object."""
-    data: Dict[str, Any] = {
+    data: MarkedView = {
         'outlines': outlines(colour_of(answer.mask)[:, :, 0]) if answer.mask.data else [],
         'elapsed': round(float(answer.elapsed), 3),
     }
@@ -127,16 +128,16 @@ def marked_view(answer: SegmentObjectResponse) -> Dict[str, Any]:
         place, turn = answer.object.pose.position, answer.object.pose.orientation
         data['object'] = {
             'frame': answer.object.header.frame_id[:200],
-            'position': _finite(place.x, place.y, place.z),
-            'yaw': _finite(2 * np.arctan2(turn.z, turn.w))[0],
+            'position': (_finite(place.x), _finite(place.y), _finite(place.z)),
+            'yaw': _finite(2 * np.arctan2(turn.z, turn.w)),
             'points': answer.cloud.width,
-            'size': _finite(answer.size.x, answer.size.y, answer.size.z),
+            'size': (_finite(answer.size.x), _finite(answer.size.y), _finite(answer.size.z)),
             'cloud': _points(answer.cloud),
         }
     return data
 
 
-def _points(message: PointCloud2) -> Dict[str, Any]:
+def _points(message: PointCloud2) -> MarkedCloudView:
     """An object's cloud as the page gets clouds, its bytes in base64.
 
     Without points where the cloud cannot be shown.
@@ -146,7 +147,15 @@ def _points(message: PointCloud2) -> Dict[str, Any]:
     except CloudError:
         cloud = Cloud(np.zeros((0, 3)), np.zeros((0, 3), np.uint8))
     encoded = encode_points(cloud, message.width * message.height)
-    return dict(encoded.facts, data=base64.b64encode(encoded.body).decode())
+    facts, data = encoded.facts, base64.b64encode(encoded.body).decode()
+    return {
+        'kind': 'cloud',
+        'count': facts['count'],
+        'of': facts['of'],
+        'offset': facts['offset'],
+        'scale': facts['scale'],
+        'data': data,
+    }
 
 
 def outlines(mask: np.ndarray) -> List[List[int]]:
@@ -168,8 +177,8 @@ def _corners(points: List[Any]) -> List[Point32]:
     return [Point32(x, y, 0.0) for x, y in points]
 
 
-def _finite(*values: float) -> List[float]:
-    return [round(float(value), 4) if np.isfinite(value) else 0.0 for value in values]
+def _finite(value: float) -> float:
+    return round(float(value), 4) if np.isfinite(value) else 0.0
 
 
 def _record(person: Person, why: str) -> str:

@@ -1,10 +1,12 @@
 """The printed output of an interface, as plain data for the page. Pure."""
 
-from typing import Any, Dict, Optional
+from typing import Dict, Optional
 
 from smach_oracle.msg import InterfaceOutput
 
-_STATUS = {
+from ..shapes.questions import InterfaceOutputView, InterfaceStatus
+
+_STATUS: Dict[int, InterfaceStatus] = {
     InterfaceOutput.STARTING: 'starting',
     InterfaceOutput.RUNNING: 'running',
     InterfaceOutput.FAILED: 'failed',
@@ -14,7 +16,7 @@ SHOWN_LINES = 60
 LONGEST_TEXT = 500
 
 
-def interface_output_view(message: Optional[InterfaceOutput]) -> Optional[Dict[str, Any]]:
+def interface_output_view(message: Optional[InterfaceOutput]) -> Optional[InterfaceOutputView]:
     """Status, text and the last lines, or None where nothing was started."""
     if message is None:
         return None

@@ -11,6 +11,7 @@ from ...front_end import FrontEnd
 from ..commands.commands import PageCommand
 from ..feeds.node_pulse import NodePulse
 from ..sensors.robot_clocks import RobotClocks
+from ..shapes.robots import HeardView
 from ..web.sections import PageSections
 
 BEAT_S = 1.0
@@ -53,18 +54,15 @@ class LastHeard:
         self._beat_s = now_s
         self._follow()
         self._told = {name: _came_s(self._front_end.news(name)) for name in self._front_end.servers}
-        sections.put(
-            'heard',
-            {
-                'beat': round(now_s, 1),
-                'master': _age(self._master_heard_s(), now_s),
-                'servers': {name: _age(came_s, now_s) for name, came_s in self._told.items()},
-                'robots': {
-                    robot: _age(self._robot_heard_s(robot), now_s)
-                    for robot in sorted(self._followed)
-                },
+        heard: HeardView = {
+            'beat': round(now_s, 1),
+            'master': _age(self._master_heard_s(), now_s),
+            'servers': {name: _age(came_s, now_s) for name, came_s in self._told.items()},
+            'robots': {
+                robot: _age(self._robot_heard_s(robot), now_s) for robot in sorted(self._followed)
             },
-        )
+        }
+        sections.put('heard', heard)
 
     def _is_heard_again(self) -> bool:
         """A server without questions is silent. With the next one it must not read as silent."""

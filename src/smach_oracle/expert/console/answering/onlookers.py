@@ -1,7 +1,9 @@
 """The people who look at each question, sent to all pages. Only the sockets' thread calls it."""
 
-from typing import Any, Dict, List, NamedTuple
+from typing import Dict, List, NamedTuple
 
+from ..shapes.basics import ByKey
+from ..shapes.questions import OnlookerView
 from ..web.audit import Person
 from ..web.sections import PageSections
 
@@ -41,7 +43,7 @@ class Onlookers:
             self._write()
 
     def _write(self) -> None:
-        by_question: Dict[str, List[Dict[str, Any]]] = {}
+        by_question: ByKey[List[OnlookerView]] = {}
         for _, (question, person) in sorted(self._by_page.items()):
             by_question.setdefault(question, []).append(
                 {'name': person.expert, 'role': person.role, 'session': person.session}

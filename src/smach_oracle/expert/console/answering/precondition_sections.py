@@ -3,18 +3,20 @@
 import threading
 import time
 from collections import OrderedDict
-from typing import Any, Callable, Dict, Iterable, List, Tuple
+from typing import Callable, Iterable, List, Tuple
 
 from smach_oracle.msg import PreconditionCheck, PreconditionChecks
 
 from ...followed_server import ListedQuestion
 from ...robot_topics import RobotTopics
+from ..shapes.basics import ByState
+from ..shapes.questions import PreconditionStatusView
 from ..web.sections import PageSections
 
 SECTION = 'preconditions'
 MOST_QUESTIONS = 64
 LONGEST_TEXT = 400
-StatusByState = Dict[str, List[Dict[str, Any]]]
+StatusByState = ByState[List[PreconditionStatusView]]
 _HOLDS = {PreconditionCheck.HOLDS: True, PreconditionCheck.DOES_NOT_HOLD: False}
 
 

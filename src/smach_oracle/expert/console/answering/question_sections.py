@@ -2,10 +2,11 @@
 
 import time
 from collections import OrderedDict
-from typing import Any, Dict, List, Optional
+from typing import Dict, List, NamedTuple, Optional
 
 from ...followed_server import ListedQuestion
 from ...front_end import FrontEnd
+from ..shapes.questions import QueryServerView, QuestionView
 from ..trials.trial_log import TrialLog
 from ..web.sections import PageSections
 from .question_view import question_view
@@ -14,6 +15,17 @@ from .session_claims import SessionClaims
 # each list has ages of its own. Smaller differences come from the link, not from the question
 _JITTER_S = 1.0
 MOST_REMEMBERED = 1000
+
+
+class _QuestionTimes(NamedTuple):
+    """The times of a question as written last, s since the epoch."""
+
+    asked: float
+    deadline: Optional[float]
+
+
+def _same(before: Optional[float], now: Optional[float]) -> bool:
+    return before is not None and now is not None and abs(before - now) < _JITTER_S
 
 
 class QuestionSections:
@@ -30,7 +42,7 @@ class QuestionSections:
         self._front_end = front_end
         self._log = log
         self._epoch_s = time.time() - time.monotonic()
-        self._times: Dict[str, Dict[str, Optional[float]]] = {}
+        self._times: Dict[str, _QuestionTimes] = {}
         self._first_asked: 'OrderedDict[str, float]' = OrderedDict()  # by key, open or not
 
     def write_sections(self, sections: PageSections) -> None:
@@ -40,19 +52,19 @@ class QuestionSections:
             (self._view(each) for each in listed), key=lambda view: (view['asked'], view['key'])
         )
         self._times = {
-            view['key']: {'asked': view['asked'], 'deadline': view['deadline']} for view in views
+            view['key']: _QuestionTimes(view['asked'], view['deadline']) for view in views
         }
         # first: where a question goes with its server, that is told of it
         sections.put('servers', self._servers())
         sections.put('questions', views)
 
-    def _servers(self) -> List[Dict[str, Any]]:
+    def _servers(self) -> List[QueryServerView]:
         return [
             {'name': name, 'connected': self._front_end.connected(name)}
             for name in self._front_end.servers
         ]
 
-    def _view(self, listed: ListedQuestion) -> Dict[str, Any]:
+    def _view(self, listed: ListedQuestion) -> QuestionView:
         place = (listed.goal.robot, listed.goal.container_path, listed.goal.failed_state)
         view = question_view(
             listed,
@@ -61,10 +73,12 @@ class QuestionSections:
             self._log.rule(listed.goal.trial_id),
             self._log.way_above(listed.goal.trial_id, listed.goal.container_path),
         )
-        for name, before in self._times.get(listed.key, {}).items():
-            now = view[name]
-            if before is not None and now is not None and abs(before - now) < _JITTER_S:
-                view[name] = before
+        before = self._times.get(listed.key)
+        if before is not None:
+            if _same(before.asked, view['asked']):
+                view['asked'] = before.asked
+            if _same(before.deadline, view['deadline']):
+                view['deadline'] = before.deadline
         view['session'] = self._sessions.session_of(listed)
         view['idle'] = self._sessions.idle_periods(listed)
         view['asked'] = self._since(listed.key, view['asked'])

@@ -1,7 +1,7 @@
 """An open question as plain data for the page. Pure."""
 
 import math
-from typing import Any, Callable, Dict, Iterable, List, Sequence, Union
+from typing import Callable, Dict, Iterable, List, Sequence, Union
 
 from smach_oracle.msg import ExpertQueryGoal, OpenQuery, StateChoice, UserdataItem, VisitedState
 from smach_oracle.oracle.records.events import FailureKind
@@ -13,14 +13,23 @@ from smach_oracle.ros.userdata_codec import UserdataCodecError, decode
 from ...followed_server import ListedQuestion
 from ...wording import failure_words, standing_words, still_runs
 from ..feeds.views import number
+from ..shapes.questions import (
+    OutcomeChoiceView,
+    QuestionStatus,
+    QuestionView,
+    StateChoiceView,
+    UserdataItemView,
+    VisitResult,
+    VisitView,
+)
 from ..trials.recovery_statistics import RecoveryCounts
 from ..trials.ways import Level
 
 LONGEST_TEXT = 8000
 LONGEST_VALUE = 4000
-_VISITS = {1: 'success', 2: 'failure', 3: 'superseded', 4: 'preempted'}
+_VISITS: Dict[int, VisitResult] = {1: 'success', 2: 'failure', 3: 'superseded', 4: 'preempted'}
 _FAILED_BY_OUTCOME = (FailureKind.FAILING_OUTCOME, FailureKind.FELL_THROUGH)
-_STATUS = {
+_STATUS: Dict[int, QuestionStatus] = {
     OpenQuery.PENDING: 'pending',
     OpenQuery.CLAIMED: 'claimed',
     OpenQuery.INTERFACE_RUNNING: 'interface',
@@ -33,7 +42,7 @@ def question_view(
     recovery_counts: Callable[[str], RecoveryCounts],
     rule: FailureRule,
     above: Sequence[Level] = (),
-) -> Dict[str, Any]:
+) -> QuestionView:
     """Return one open question with all that is known of it.
 
     :param epoch_s: what to add to this process's monotonic clock to have s since the epoch.
@@ -63,6 +72,8 @@ def question_view(
         'tried': list(goal.tried),
         'status': _STATUS.get(listed.status, 'pending'),
         'holder': listed.holder,
+        'session': '',
+        'idle': 0,
         'interface': goal.interface,
         'asked': round(epoch_s + listed.asked_s, 1),
         'deadline': None
@@ -93,7 +104,7 @@ def question_view(
     }
 
 
-def _visits(visits: Iterable[Union[VisitedState, Visit]]) -> List[Dict[str, str]]:
+def _visits(visits: Iterable[Union[VisitedState, Visit]]) -> List[VisitView]:
     return [
         {'state': visit.state, 'outcome': visit.outcome, 'result': _VISITS.get(visit.result, '')}
         for visit in visits
@@ -102,7 +113,7 @@ def _visits(visits: Iterable[Union[VisitedState, Visit]]) -> List[Dict[str, str]
 
 def _choices(
     goal: ExpertQueryGoal, recovery_counts: Callable[[str], RecoveryCounts]
-) -> List[Dict[str, Any]]:
+) -> List[StateChoiceView]:
     return [
         {
             'state': choice.state,
@@ -115,7 +126,7 @@ def _choices(
             'blocked': choice.blocked,
             'repeats': list(choice.repeats),
             'runs_again': list(choice.runs_again),
-            'helped': list(_helped(choice, recovery_counts)),
+            'helped': _helped(choice, recovery_counts),
             'helped_s': choice.helped_s if choice.tried else None,
             'recommended': choice.recommended,
         }
@@ -132,7 +143,7 @@ def _helped(
     return RecoveryCounts(0, 0) if choice.container else recovery_counts(choice.state)
 
 
-def _supersede(goal: ExpertQueryGoal, rule: FailureRule) -> List[Dict[str, str]]:
+def _supersede(goal: ExpertQueryGoal, rule: FailureRule) -> List[OutcomeChoiceView]:
     """First those with which the machine goes on. Each with what it means of the state's work."""
     states = {choice.state for choice in goal.choices if not choice.container}
     return [
@@ -153,7 +164,7 @@ def _meaning(outcome: str, goal: ExpertQueryGoal, rule: FailureRule) -> str:
     return rule.meaning(outcome).value
 
 
-def _item(item: UserdataItem) -> Dict[str, str]:
+def _item(item: UserdataItem) -> UserdataItemView:
     """A key of the userdata: its type, and its value as text where it was sent."""
     if item.encoding == UserdataItem.UNSENT:
         return {'key': item.key, 'type': item.type, 'value': '', 'note': 'not sent'}

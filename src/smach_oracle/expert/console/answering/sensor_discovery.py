@@ -2,7 +2,7 @@
 
 from functools import partial
 from types import MappingProxyType
-from typing import Any, Dict, Mapping, Sequence, Set
+from typing import Mapping, Optional, Sequence, Set
 
 import rosservice
 
@@ -16,6 +16,8 @@ from ..sensors.depth_clouds import TYPE as DEPTH_TYPE
 from ..sensors.robot_cameras import PARAMETER, RobotCameras, declared_in
 from ..sensors.robot_stream import DESCRIPTION, RobotStream, robots_in
 from ..sensors.sensor_streams import DerivedStream, SensorStreams
+from ..shapes.basics import ByKey
+from ..shapes.sensors import PerceptionSensorsView, SensorListView
 from ..web.sections import PageSections
 from .interface_actions import action_of, interface_actions
 
@@ -74,31 +76,31 @@ class SensorDiscovery:
 
     def write_sections(self) -> None:
         """Bring the section up to date."""
-        self._sections.put(
-            'sensors', {'sensors': self.sensors.view(), 'perception': self._running()}
-        )
+        view: SensorListView = {'sensors': self.sensors.view(), 'perception': self._running()}
+        self._sections.put('sensors', view)
 
     def _update(self) -> None:
         self.sensors.update_subscriptions()
         self.write_sections()
 
-    def _running(self) -> Dict[str, Any]:
+    def _running(self) -> ByKey[PerceptionSensorsView]:
         """The questions for which a perception interface runs, each with two of its sensors.
 
         Those of the image and of its cloud, or None before there is one.
         """
-        running = {}
+        running: ByKey[PerceptionSensorsView] = {}
         for listed in self._front_end.questions():
             action = action_of(listed)
             if action and self.is_perception(action):
                 running[listed.key] = {
-                    name: sensor.number if sensor else None
-                    for name, sensor in (
-                        (name, self.sensors.on('{}/{}'.format(action, name)))
-                        for name in ('image', 'cloud')
-                    )
+                    'image': self._number_on(action + '/image'),
+                    'cloud': self._number_on(action + '/cloud'),
                 }
         return running
+
+    def _number_on(self, topic: str) -> Optional[int]:
+        sensor = self.sensors.on(topic)
+        return sensor.number if sensor else None
 
     def _follow_interfaces(self, published: Sequence[Sequence[str]], services: Set[str]) -> None:
         there = {action for action in interface_actions(published) if action + _SEGMENT in services}

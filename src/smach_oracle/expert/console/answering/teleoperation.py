@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from typing import Any, Dict, Optional, Set
+from typing import Dict, Optional, Set
 
 import rospy
 
@@ -17,6 +17,7 @@ from ...repeating import repeat
 from ..commands.checks import shown
 from ..commands.commands import CommandReply, PageCommand
 from ..feeds.views import number
+from ..shapes.sensors import ManipulationView
 from ..web.audit import Audit, Person
 from ..web.sections import PageSections
 from .driving_control import DrivingSession
@@ -200,9 +201,9 @@ def _operator(session: DrivingSession) -> str:
     return '{} ({} {})'.format(session.person.expert, rospy.get_name(), session.page)
 
 
-def _view(client: TeleopClient) -> Dict[str, Any]:
+def _view(client: TeleopClient) -> ManipulationView:
     state, session = client.state, client.control.session
-    view: Dict[str, Any] = {
+    view: ManipulationView = {
         'frames': sorted(client.frames(client.arm)),
         'arms': client.arms,
         'boxes': client.boxes,
@@ -221,6 +222,6 @@ def _view(client: TeleopClient) -> Dict[str, Any]:
             'clearance': number(state.clearance, 3),
             'gripper': number(state.gripper, 3),
             'stalled': state.gripper_stalled,
-            'at': [number(each, 3) for each in (at.x, at.y, at.z)],
+            'at': (number(at.x, 3), number(at.y, 3), number(at.z, 3)),
         }
     return view

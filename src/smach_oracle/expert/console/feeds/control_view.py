@@ -1,21 +1,22 @@
 """The state of a robot's machines, as plain data for the page. Pure."""
 
-from typing import Any, Dict, List
+from typing import List
 
 from smach_oracle.msg import ControlStatus, MachineControl
+
+from ..shapes.robots import HeldMachineView
 
 MOST_MACHINES = 20
 MOST_ACTIVE = 50  # states of a machine that run or wait
 MOST_BREAKPOINTS = 100
-MachineView = Dict[str, Any]
 
 
-def control_view(message: ControlStatus) -> List[MachineView]:
+def control_view(message: ControlStatus) -> List[HeldMachineView]:
     """A robot's top-level machines: what runs, what waits and why, which breakpoints are set."""
     return [_machine(each) for each in message.machines[:MOST_MACHINES]]
 
 
-def _machine(machine: MachineControl) -> MachineView:
+def _machine(machine: MachineControl) -> HeldMachineView:
     return {
         'path': machine.path,
         'running': machine.running,

@@ -20,6 +20,9 @@ from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.settings.failure_rule import RULE, rule_in
 
 from ...wording import event_words
+from ..shapes.basics import ByPath, ByState
+from ..shapes.robots import LearnedRateView
+from ..shapes.trials import TrialEventView
 
 LONGEST_LINE = 300
 LATEST_S = 1e11  # s since the epoch: a later time is not valid
@@ -81,7 +84,7 @@ def _rule_in(data: str) -> Dict[str, Any]:
     return {} if rule is None else {RULE: rule.as_data()}
 
 
-def event_view(event: Event) -> Dict[str, Any]:
+def event_view(event: Event) -> TrialEventView:
     """Return one event of a trial's time axis."""
     return {
         'seq': event.seq,
@@ -107,9 +110,9 @@ def last_line(text: str) -> str:
     return shortened(text.strip().rpartition('\n')[2], LONGEST_LINE)
 
 
-def rates_view(message: OracleRates) -> Dict[str, Dict[str, Dict[str, Any]]]:
+def rates_view(message: OracleRates) -> ByPath[ByState[LearnedRateView]]:
     """Return the learned rates: container path -> label -> rate, class and counts."""
-    found: Dict[str, Dict[str, Dict[str, Any]]] = {}
+    found: ByPath[ByState[LearnedRateView]] = {}
     for row in message.states:
         found.setdefault(row.path, {})[row.state] = {
             'rate': number(row.rate),

@@ -13,6 +13,8 @@ from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.ros.master_watch import timed_master
 from smach_oracle.ros.senders.own_messages import subscribe_to_owner
 
+from ..shapes.people import ActView
+
 MOST_ACTS = 300  # the latest
 MOST_CONSOLES = 16
 AUDIT = '/audit'
@@ -28,7 +30,7 @@ class Acts:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._acts: Deque[Dict[str, Any]] = deque(maxlen=MOST_ACTS)
+        self._acts: Deque[ActView] = deque(maxlen=MOST_ACTS)
         self._count = 0
         self._subscribers: Dict[str, rospy.Subscriber] = {}
 
@@ -56,9 +58,9 @@ class Acts:
             return
         with self._lock:
             self._count += 1
-            self._acts.appendleft(dict(act_view(message), id=str(self._count)))
+            self._acts.appendleft(act_view(message, str(self._count)))
 
-    def rows(self) -> List[Dict[str, Any]]:
+    def rows(self) -> List[ActView]:
         """Return the acts as plain data, newest first."""
         with self._lock:
             return list(self._acts)
@@ -81,10 +83,11 @@ def console_audits(types: Dict[str, str], publishers: Sequence[Sequence[Any]]) -
     }
 
 
-def act_view(message: ConsoleCommand) -> Dict[str, Any]:
-    """Return an act as plain data. `at` is in s since the epoch."""
+def act_view(message: ConsoleCommand, name: str) -> ActView:
+    """Return an act as plain data. `name`: tells it from the others."""
     at = message.wall_time
     return {
+        'id': name,
         'at': at if math.isfinite(at) and 0 <= at <= _LATEST_S else 0.0,
         'who': shortened(message.expert, 100),
         'role': shortened(message.role, 40),

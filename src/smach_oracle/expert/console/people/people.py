@@ -3,11 +3,12 @@
 import threading
 import time
 from collections import deque
-from typing import Any, Deque, Dict
+from typing import Deque
 
 from smach_oracle.oracle.records.events import Event
 
 from ..commands.commands import CommandReply, PageCommand
+from ..shapes.people import ActOverviewView, PeopleView
 from ..web.audit import Audit, Person
 from ..web.sections import PageSections
 from ..web.shifts import Shifts
@@ -62,17 +63,21 @@ class People:
         """Bring the sections up to date. One thread calls it."""
         if self.acts.version != self._acts_version:
             self._acts_version = self.acts.version
-            sections.put('acts', {'acts': self.acts.rows()})
+            overview: ActOverviewView = {'acts': self.acts.rows()}
+            sections.put('acts', overview)
         if self._journal.version != self._version:
             self._version = self._journal.version
             sections.put('people', self._view())
 
-    def _view(self) -> Dict[str, Any]:
+    def _view(self) -> PeopleView:
         journal = self._journal
         return {
             'since': self._since,
             'kept': bool(journal.path),
             'problem': journal.problem[:300],
-            'notes': [note._asdict() for note in journal.notes],
+            'notes': [
+                {'id': note.id, 'at': note.at, 'who': note.who, 'text': note.text}
+                for note in journal.notes
+            ],
             'shifts': shift_rows(journal.answered, self._shifts),
         }

@@ -1,14 +1,15 @@
 """The answers of each person in each shift, and the times that they took. Pure."""
 
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Tuple
+from typing import Dict, Iterable, List, Optional, Sequence, Tuple
 
+from ..shapes.people import ShiftView
 from ..web.shifts import Shifts
 from .answer_times import AnsweredQuestion
 
 MOST_SHIFTS = 30  # that are shown, the latest
 
 
-def shift_rows(answered: Iterable[AnsweredQuestion], shifts: Shifts) -> List[Dict[str, Any]]:
+def shift_rows(answered: Iterable[AnsweredQuestion], shifts: Shifts) -> List[ShiftView]:
     """Return the latest shifts as plain data, newest first, each with its people.
 
     A person has the number of answers. `claim`, `answer` and `resume` are the mean and the longest

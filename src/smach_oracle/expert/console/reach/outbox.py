@@ -3,10 +3,11 @@
 import threading
 import time
 from collections import OrderedDict
-from typing import Callable, List, NamedTuple, Sequence
+from typing import Callable, Final, List, NamedTuple, Sequence
 
 import rospy
 
+from ..shapes.basics import CallStatus
 from .calls_text import CalledQuestion
 from .delivery import NotDelivered, deliver
 from .on_call import OnCallList, Receiver
@@ -16,7 +17,10 @@ MOST_WAITING = 500
 GATHER_S = 30.0  # between two messages: a fleet that fails at once sends one, and not a hundred
 RETRY_AFTER_S = (5.0, 20.0, 60.0)
 # dropped: somebody had come to the question before the message was sent
-WAITING, SENT, FAILED, DROPPED = 'waiting', 'sent', 'failed', 'dropped'
+WAITING: Final = 'waiting'
+SENT: Final = 'sent'
+FAILED: Final = 'failed'
+DROPPED: Final = 'dropped'
 
 
 class CallResult(NamedTuple):
@@ -24,7 +28,7 @@ class CallResult(NamedTuple):
 
     key: str
     receiver: Receiver
-    status: str  # waiting, sent, failed or dropped
+    status: CallStatus
     why: str  # it has not been delivered yet, or at all
     at: float  # s since the epoch
 
@@ -120,6 +124,6 @@ class Outbox:
                 self._tell(questions, SENT, '')
                 return
 
-    def _tell(self, questions: Sequence[CalledQuestion], status: str, why: str) -> None:
+    def _tell(self, questions: Sequence[CalledQuestion], status: CallStatus, why: str) -> None:
         for question in questions:
             self._note(CallResult(question.key, self._receiver, status, why, time.time()))

@@ -4,10 +4,12 @@ import threading
 import time
 from collections import OrderedDict, deque
 from datetime import datetime
-from typing import Any, Callable, Deque, Dict, List, Mapping, Optional, Sequence, Set
+from typing import Callable, Deque, Dict, List, Mapping, Optional, Sequence, Set
 
 from ...followed_server import ListedQuestion
 from ..sensors.images import BrowserFile
+from ..shapes.basics import ByKey
+from ..shapes.people import CallView, FailedCallView, NextCallView, ReachView
 from ..web.sections import PageSections
 from .calls_text import called_question
 from .escalation import DueCall, Escalation
@@ -51,8 +53,8 @@ class Reach:
         self._results: Dict[str, 'OrderedDict[Receiver, CallResult]'] = {}  # of open questions
         self._dropped: List[DueCall] = []
         self._unreached: List[DueCall] = []
-        self._failed: Deque[Dict[str, Any]] = deque(maxlen=MOST_FAILED)
-        self._next: Dict[str, Dict[str, Any]] = {}
+        self._failed: Deque[FailedCallView] = deque(maxlen=MOST_FAILED)
+        self._next: ByKey[NextCallView] = {}
         self._seen_s: Dict[str, float] = {}
         self._outboxes = {
             receiver: outbox(receiver, on_call, lambda key: key in self._waiting, self._note)
@@ -127,9 +129,10 @@ class Reach:
             failed = list(self._failed)
         following = {key: self._following(key, moment) for key, waiting in waits.items() if waiting}
         self._next = {key: each for key, each in following.items() if each is not None}
-        self._sections.put(SECTION, {'calls': calls, 'next': self._next, 'failed': failed})
+        view: ReachView = {'calls': calls, 'next': self._next, 'failed': failed}
+        self._sections.put(SECTION, view)
 
-    def _following(self, key: str, moment: datetime) -> Optional[Dict[str, Any]]:
+    def _following(self, key: str, moment: datetime) -> Optional[NextCallView]:
         found = self._escalation.next_call(key, moment)
         if found is None:
             return None
@@ -140,7 +143,7 @@ class Reach:
         return {'people': found.people, 'at': at}
 
 
-def _views(results: 'OrderedDict[Receiver, CallResult]') -> List[Dict[str, Any]]:
+def _views(results: 'OrderedDict[Receiver, CallResult]') -> List[CallView]:
     return [
         {'to': each.receiver.words, 'status': each.status, 'why': each.why, 'at': round(each.at, 1)}
         for each in results.values()

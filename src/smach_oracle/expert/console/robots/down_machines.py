@@ -3,7 +3,7 @@
 import os
 import shlex
 import threading
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.store.errors import StoreError
 from smach_oracle.store.holding import MachineLock
@@ -12,6 +12,7 @@ from smach_oracle.store.rows import StoredMoment, StoredTrial
 from smach_oracle.store.stopped_trial import StoppedTrial, in_words, trial_to_change
 from smach_oracle.store.store_file import StoreFile
 
+from ..shapes.robots import DownMachineView
 from ..web.sections import PageSections
 
 MOST_MACHINES = 50  # of a store, those that were stopped last
@@ -27,7 +28,7 @@ class _Looked(NamedTuple):
     """The rows of a store, read when its files had this `stamp`."""
 
     stamp: _Stamp
-    rows: List[Dict[str, Any]]
+    rows: List[DownMachineView]
 
 
 class DownMachines:
@@ -70,7 +71,7 @@ class DownMachines:
         finally:
             self._lock.release()
 
-    def _row_of(self, key: str) -> Optional[Dict[str, Any]]:
+    def _row_of(self, key: str) -> Optional[DownMachineView]:
         """Return the row of a machine of our stores. It may be held by now."""
         for path in self._stores:
             looked = self._looked.get(path)
@@ -82,7 +83,7 @@ class DownMachines:
     def _look(self) -> None:
         self._sections.put('down', [row for path in self._stores for row in self._rows(path)])
 
-    def _rows(self, path: str) -> List[Dict[str, Any]]:
+    def _rows(self, path: str) -> List[DownMachineView]:
         stamp = _stamp(path)
         looked = self._looked.get(path)
         if looked is None or looked.stamp != stamp:
@@ -109,7 +110,7 @@ def _stamp(path: str) -> _Stamp:
     return tuple(found)
 
 
-def _read(path: str) -> List[Dict[str, Any]]:
+def _read(path: str) -> List[DownMachineView]:
     try:
         store = StoreFile(path, read_only=True)
     except StoreError as err:
@@ -124,7 +125,7 @@ def _read(path: str) -> List[Dict[str, Any]]:
         store.close()
 
 
-def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
+def _row(store: StoreFile, trial: StoredTrial) -> DownMachineView:
     stopped = StoppedTrial(store, trial)
     userdata = list(stopped.userdata())
     return {
@@ -139,7 +140,7 @@ def _row(store: StoreFile, trial: StoredTrial) -> Dict[str, Any]:
         'questions': [
             '{} about {}'.format(question, path) for path, question in stopped.questions()
         ],
-        'userdata': [list(each) for each in userdata[:MOST_KEYS]],
+        'userdata': userdata[:MOST_KEYS],
         'more_userdata': max(0, len(userdata) - MOST_KEYS),
         'command': 'rosrun smach_oracle oracle_state {} show --trial {}'.format(
             shlex.quote(store.path), trial.number
@@ -153,7 +154,7 @@ def _stored_last(moments: Sequence[StoredMoment]) -> float:
     return next((each.at for each in reversed(moments) if each.kind != EDIT), moments[-1].at)
 
 
-def _problem(path: str, err: Exception) -> Dict[str, Any]:
+def _problem(path: str, err: Exception) -> DownMachineView:
     return {
         'key': path,
         'store': path,

@@ -1,7 +1,7 @@
 """One robot as its topics show it: containers, active states, learned rates."""
 
 import threading
-from typing import Any, Dict, FrozenSet, List, Optional
+from typing import Dict, FrozenSet, List, Optional, Tuple
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
 from smach_oracle.analysis.graphs.container_graph import (
@@ -12,13 +12,23 @@ from smach_oracle.analysis.graphs.container_graph import (
     shares,
     structure_from_counts,
 )
+from smach_oracle.analysis.graphs.drawn_graph import TransitionCount
 from smach_oracle.msg import ControlStatus, OracleEvent, OracleRates
 from smach_oracle.oracle.records.short_text import shortened
 
 from ...wording import event_words
-from ..feeds.control_view import MachineView, control_view
+from ..feeds.control_view import control_view
 from ..feeds.views import event_of, number, rates_view
 from ..graphs.layout_worker import LayoutWorker
+from ..shapes.basics import ByPath, ByState
+from ..shapes.robots import (
+    FailedStateView,
+    HeldMachineView,
+    LastWordView,
+    LatestTransition,
+    LearnedRateView,
+    LiveMachinesView,
+)
 from ..web.sections import PageSections
 from .same_machine import Source
 
@@ -45,16 +55,15 @@ class FollowedRobot:
         self._lock = threading.Lock()
         self._structures: Dict[str, ContainerGraph] = {}
         self._active: Dict[str, List[str]] = {}
-        # path -> [source, target] of the transition made last
-        self._latest: Dict[str, List[str]] = {}
-        self._failed: Dict[str, Dict[str, Any]] = {}
-        self._rates: Dict[str, Dict[str, Dict[str, Any]]] = {}
-        self._counts: Dict[str, List[List[Any]]] = {}
+        self._latest: ByPath[LatestTransition] = {}
+        self._failed: ByPath[FailedStateView] = {}
+        self._rates: ByPath[ByState[LearnedRateView]] = {}
+        self._counts: ByPath[List[TransitionCount]] = {}
         self._trial = ''
         self._unwell = ''  # why it waits until it is well
-        self._last: Optional[Dict[str, Any]] = None  # what it said last, and when
+        self._last: Optional[LastWordView] = None  # what it said last, and when
         # how its machines stand. None means they cannot be held
-        self.machines: Optional[List[MachineView]] = None
+        self.machines: Optional[List[HeldMachineView]] = None
 
     def on_structure(self, message: SmachContainerStructure) -> None:
         """A container's graph. Most repeat what is known."""
@@ -81,7 +90,7 @@ class FollowedRobot:
     def on_rates(self, message: OracleRates) -> None:
         """Note what was learned. A message covers one top machine."""
         rates = rates_view(message)
-        rows: Dict[str, List[Any]] = {}
+        rows: ByPath[List[Tuple[str, str, str, int]]] = {}
         for row in message.transitions:
             rows.setdefault(row.path, []).append((row.state, row.outcome, row.target, row.count))
         with self._lock:
@@ -120,11 +129,11 @@ class FollowedRobot:
                 self._failed.clear()
                 self._latest.clear()
             elif message.kind == OracleEvent.TRANSITION:
-                self._latest[message.path] = [message.state, message.target]
+                self._latest[message.path] = (message.state, message.target)
             elif message.kind == OracleEvent.FAILURE:
                 self._failed[message.path] = {'state': message.state, 'rate': number(message.rate)}
             elif message.kind == OracleEvent.JUMP:
-                self._latest[message.path] = ['', message.target]
+                self._latest[message.path] = ('', message.target)
             if message.kind in _LEAVES_ORACLE or message.kind == OracleEvent.CONTAINER_END:
                 self._failed.pop(message.path, None)
             self.changed = True
@@ -143,7 +152,7 @@ class FollowedRobot:
             self.changed = False
             reshaped, self._reshaped = self._reshaped, False
             structures = self._all_structures()
-            live = {
+            live: LiveMachinesView = {
                 'trial': self._trial,
                 'alive': self.alive,
                 'unwell': self._unwell,

@@ -18,6 +18,8 @@ from smach_oracle.ros.master_watch import timed_master
 
 from ...robot_topics import READ_BYTES
 from ..feeds.views import number
+from ..shapes.basics import HealthLevel
+from ..shapes.robots import BatteryView, HealthProblemView, RobotHealthView
 from ..web.sections import PageSections
 
 SECTION = 'health'
@@ -28,7 +30,7 @@ OLD_S = 30.0  # without news
 FORGOTTEN_S = 60.0
 LOW_SHARE = 0.2
 LONGEST = 200
-LEVELS = {1: 'warn', 2: 'error', 3: 'stale'}
+LEVELS: Dict[int, HealthLevel] = {1: 'warn', 2: 'error', 3: 'stale'}
 # questions, and what the page shows of states anyway
 _SHOWN_ELSEWHERE = (': oracle questions', ': oracle states')
 
@@ -104,7 +106,7 @@ class RobotHealth:
             self._statuses = _fresh(self._statuses, now_s)
             batteries, statuses = dict(self._batteries), dict(self._statuses)
         known = sorted(robots)
-        found = {}
+        found: Dict[str, RobotHealthView] = {}
         for robot in known:
             own = [each for topic, each in sorted(batteries.items()) if _owns(robot, topic, known)]
             shown = _problems(robot, known, statuses)
@@ -141,7 +143,7 @@ def _level(status: DiagnosticStatus) -> int:
 
 def _problems(
     robot: str, robots: Sequence[str], statuses: Dict[Tuple[str, str], _PartStatus]
-) -> List[Dict[str, Any]]:
+) -> List[HealthProblemView]:
     begins = robot.lstrip('/')
     found = [
         (name, status)
@@ -159,7 +161,7 @@ def _problems(
     ]
 
 
-def _battery_view(battery: _Battery, now_s: float) -> Dict[str, Any]:
+def _battery_view(battery: _Battery, now_s: float) -> BatteryView:
     message = battery.message
     share: Optional[float] = number(message.percentage, 2)
     volts: Optional[float] = number(message.voltage, 1)

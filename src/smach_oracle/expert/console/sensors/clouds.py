@@ -6,6 +6,8 @@ import numpy as np
 from sensor_msgs.msg import JointState, PointCloud2, PointField
 
 from ..feeds.views import number
+from ..shapes.basics import Vector
+from ..shapes.sensors import CloudSizeView
 from .images import BrowserFile
 
 MOST_SHOWN = 20000  # points
@@ -48,18 +50,25 @@ def encode_points(cloud: Cloud, of: int) -> BrowserFile:
     """Return the same of points that were thinned already. `of`: how many there were."""
     low = cloud.points.min(axis=0) if len(cloud.points) else np.zeros(3)
     span = np.maximum(cloud.points.max(axis=0) - low, 1e-6) if len(cloud.points) else np.ones(3)
+    facts: CloudSizeView = {
+        'kind': 'cloud',
+        'count': len(cloud.points),
+        'of': of,
+        'offset': vector(low),
+        'scale': vector(span),
+    }
     packed = np.round((cloud.points - low) / span * 65535).astype('<u2')
     return BrowserFile(
         'application/octet-stream',
         packed.tobytes() + cloud.colours.tobytes(),
-        {
-            'kind': 'cloud',
-            'count': len(cloud.points),
-            'of': of,
-            'offset': [round(float(each), 6) for each in low],
-            'scale': [round(float(each), 6) for each in span],
-        },
+        dict(facts),
     )
+
+
+def vector(values: np.ndarray) -> Vector:
+    """Return three numbers, rounded."""
+    x, y, z = (round(float(each), 6) for each in values)
+    return x, y, z
 
 
 def thinned(message: PointCloud2, most: int = MOST_SHOWN) -> Cloud:

@@ -10,7 +10,7 @@ import itertools
 import threading
 import time
 from collections import OrderedDict
-from typing import Any, Callable, Dict, Iterable, List, NamedTuple, Optional, Sequence, Union
+from typing import Callable, Dict, Iterable, List, NamedTuple, Optional, Sequence, Union
 
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
@@ -19,6 +19,8 @@ from smach_oracle.msg import FailureFrames
 
 from ...followed_server import ListedQuestion
 from ...robot_topics import RobotTopics
+from ..shapes.questions import KeptImageView
+from ..shapes.sensors import SensorView
 from ..web.sections import PageSections
 from .images import BrowserFile, encode_image
 from .robot_cameras import RobotCameras
@@ -140,7 +142,7 @@ class QuestionImages:
 
     def _take_image(
         self,
-        camera: Dict[str, Any],
+        camera: SensorView,
         listed: ListedQuestion,
         seen: Dict[str, QuestionImage],
         now_s: float,
@@ -186,7 +188,7 @@ def stored_images(
             rospy.logdebug('An image of %s cannot be shown: %s', topic, err)
 
 
-def image_view(image: QuestionImage, asked_s: float = 0.0) -> Dict[str, Any]:
+def image_view(image: QuestionImage, asked_s: float = 0.0) -> KeptImageView:
     """Return an image as plain data.
 
     :param asked_s: when the question was put, by the robot's ROS clock. 0 means not known.
@@ -200,7 +202,7 @@ def image_view(image: QuestionImage, asked_s: float = 0.0) -> Dict[str, Any]:
         'topic': image.topic,
         'late': None if late is None else round(late, 1),
         'stamped': stamped or late is None,
-        'size': [image.width, image.height],
+        'size': (image.width, image.height),
     }
 
 

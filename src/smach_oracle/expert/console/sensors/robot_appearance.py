@@ -10,6 +10,8 @@ import numpy as np
 from smach_oracle.geometry.meshes import Mesh, MeshError, reduced
 from smach_oracle.geometry.robot_shapes import RobotShapes, Shape, read_shapes
 
+from ..shapes.sensors import GeometryView, ModelHeaderView
+from .clouds import vector
 from .images import BrowserFile
 from .mesh_files import MeshFiles
 
@@ -60,7 +62,8 @@ class RobotAppearance:
         uint16.
         """
         numbers = {link: index for index, link in enumerate(self.links)}
-        blocks, geometries = [], []
+        blocks: List[bytes] = []
+        geometries: List[GeometryView] = []
         for mesh in self._geometries:
             low = mesh.corners.min(axis=0)
             span = np.maximum(np.ptp(mesh.corners, axis=0), 1e-9)
@@ -72,11 +75,11 @@ class RobotAppearance:
                 {
                     'corners': len(mesh.corners),
                     'triangles': len(mesh.triangles),
-                    'offset': _plain(low),
-                    'scale': _plain(span),
+                    'offset': vector(low),
+                    'scale': vector(span),
                 }
             )
-        header = {
+        header: ModelHeaderView = {
             'name': self.robot.name,
             'version': self.version,
             'root': self.robot.root,
@@ -85,12 +88,12 @@ class RobotAppearance:
             'missing': self.missing[:MOST_NAMED],
             'lost': len(self.missing),
             'parts': [
-                [
+                (
                     numbers[part.link],
                     part.geometry,
                     _plain(part.place[:3].ravel()),
-                    list(part.colour),
-                ]
+                    part.colour,
+                )
                 for part in self._parts
             ],
         }

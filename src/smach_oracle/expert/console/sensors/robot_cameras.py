@@ -5,17 +5,17 @@ A node directly below / owns no other node's cameras: nothing tells whose those 
 """
 
 import re
-from typing import Any, Dict, Iterable, List, Mapping, Sequence
+from typing import Dict, Iterable, List, Mapping, Sequence
 
 import rosgraph.names
 
+from ..shapes.sensors import SensorView
 from ..web.sections import PageSections
 from .sensor_streams import SensorStreams
 
 SECTION = 'cameras'
 PARAMETER = '/failure_cameras'  # behind the robot's name
 MOST_DECLARED = 64
-SensorView = Dict[str, Any]
 _NO_COLOUR = re.compile('depth|disparity|/ir/')
 _RANK = [re.compile(pattern) for pattern in ('/(rgb|color|colour)/', 'image_(raw|rect|color)', '')]
 

@@ -13,6 +13,8 @@ from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tu
 import rospy
 from sensor_msgs.msg import CompressedImage, Image, JointState, PointCloud2
 
+from ..shapes.basics import SensorKind
+from ..shapes.sensors import SensorView
 from .clouds import encode_cloud, encode_joints
 from .images import BrowserFile, encode_image
 
@@ -21,14 +23,14 @@ MOST_LISTENED = 16
 IDLE_S = 6.0  # after the last request
 _GONE_AFTER = 3  # rounds in which the master did not know it
 SensorMessage = Union[Image, CompressedImage, PointCloud2, JointState]
-_TYPES: Dict[str, Tuple[str, type, Callable[[Any, int], BrowserFile]]] = {
+_TYPES: Dict[str, Tuple[SensorKind, type, Callable[[Any, int], BrowserFile]]] = {
     Image._type: ('image', Image, encode_image),
     CompressedImage._type: ('image', CompressedImage, encode_image),
     PointCloud2._type: ('cloud', PointCloud2, lambda message, _: encode_cloud(message)),
     JointState._type: ('joints', JointState, lambda message, _: encode_joints(message)),
 }
 # by type, what they show
-_DERIVED = {'robot_description': 'robot', 'depth and camera_info': 'cloud'}
+_DERIVED: Dict[str, SensorKind] = {'robot_description': 'robot', 'depth and camera_info': 'cloud'}
 
 
 class SensorSample(NamedTuple):
@@ -180,7 +182,7 @@ class SensorStreams:
             listened = sum(each.listened for each in self._all())
             sensor.update_subscription(listened < MOST_LISTENED)
 
-    def view(self) -> List[Dict[str, Any]]:
+    def view(self) -> List[SensorView]:
         """Return the streams as plain data, by topic."""
         return [
             {'id': each.number, 'topic': each.topic, 'kind': each.kind, 'type': each.type}

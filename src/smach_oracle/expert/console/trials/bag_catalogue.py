@@ -10,18 +10,25 @@ import itertools
 import os
 import threading
 import time
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Sequence, Tuple
 
 import rospy
 
 from smach_oracle.analysis.bag_events import UNFINISHED, BagError, EventReader
 from smach_oracle.analysis.bag_worker import BagReadError, BagReply, BagRequest, ReadTrial
 from smach_oracle.analysis.counting.trial_summary import TrialSummary
-from smach_oracle.analysis.variants import OTHER_END, Count, count_variant, find_variants
+from smach_oracle.analysis.variants import (
+    OTHER_END,
+    Count,
+    VariantCounts,
+    count_variant,
+    find_variants,
+)
 from smach_oracle.forking import unlock
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.packages import lacking
 
+from ..shapes.trials import BagOverviewView, CountsRowView, CountView, EndingsView, TrialView
 from ..web.sections import PageSections
 from .bag_folders import BagFolders, FileState
 from .bag_process import read_bags
@@ -37,19 +44,6 @@ SHOWN_BROKEN = 50
 MOST_BAGS_OF_A_TRIAL = 20  # the newest that were read
 MOST_REPLY = 64 * 10**6  # bytes, of all that is replayed of a trial
 BEING_WRITTEN_S = 60.0
-_COUNTS = {
-    'failures': 'failures of states',
-    'recoveries': 'oracle recoveries',
-    'questions': 'questions to the expert',
-    'answered': 'answered',
-}
-_ENDINGS = {
-    'success': 'ended in success',
-    'failure': 'ended in failure',
-    'other': OTHER_END,
-    'preempted': 'preempted',
-    'unfinished': 'unfinished',
-}
 
 
 class RecordedTrialError(OracleError):
@@ -121,19 +115,17 @@ class BagCatalogue:
             if len(trials) > SHOWN_TRIALS
             else []
         )
-        self._sections.put(
-            SECTION,
-            {
-                'waiting': waiting,
-                'note': ' '.join(notes),
-                'table': _table([each.summary for each in trials]),
-                'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
-                'broken': [
-                    {'name': self._folders.name_of(path), 'reason': reason[:300]}
-                    for path, reason in broken[:SHOWN_BROKEN]
-                ],
-            },
-        )
+        view: BagOverviewView = {
+            'waiting': waiting,
+            'note': ' '.join(notes),
+            'table': _table([each.summary for each in trials]),
+            'trials': [_row(each) for each in trials[:SHOWN_TRIALS]],
+            'broken': [
+                {'name': self._folders.name_of(path), 'reason': reason[:300]}
+                for path, reason in broken[:SHOWN_BROKEN]
+            ],
+        }
+        self._sections.put(SECTION, view)
 
     def find(self, number: int) -> BagTrial:
         """Return a trial by its number.
@@ -270,7 +262,7 @@ def _request(paths: List[str], trials: Sequence[str] = (), **more: int) -> BagRe
     return BagRequest(paths, list(trials), most_events=MOST_EVENTS, **more)
 
 
-def _row(trial: BagTrial) -> Dict[str, Any]:
+def _row(trial: BagTrial) -> TrialView:
     """A trial as the list of live trials has it, too."""
     summary = trial.summary
     return {
@@ -293,11 +285,11 @@ def _row(trial: BagTrial) -> Dict[str, Any]:
     }
 
 
-def _table(summaries: Sequence[TrialSummary]) -> List[Dict[str, Any]]:
+def _table(summaries: Sequence[TrialSummary]) -> List[CountsRowView]:
     """The counts of Table I, by the analysis of bags."""
     if not summaries:
         return []
-    rows = []
+    rows: List[CountsRowView] = []
     for found in find_variants(list(summaries)):
         variant = count_variant(found)
         rows.append(
@@ -305,17 +297,30 @@ def _table(summaries: Sequence[TrialSummary]) -> List[Dict[str, Any]]:
                 'experiment': variant.experiment,
                 'arm': variant.name,
                 'trials': variant.trials,
-                'endings': {
-                    key: variant.of(name).trials
-                    for key, name in _ENDINGS.items()
-                    if variant.has(name)
+                'endings': _endings(variant),
+                'counts': {
+                    'failures': _count(variant.of('failures of states')),
+                    'recoveries': _count(variant.of('oracle recoveries')),
+                    'questions': _count(variant.of('questions to the expert')),
+                    'answered': _count(variant.of('answered')),
                 },
-                'counts': {key: _count(variant.of(name)) for key, name in _COUNTS.items()},
                 'unwell_s': unwell(found.trials),
             }
         )
     return rows
 
 
-def _count(count: Count) -> Dict[str, Optional[int]]:
+def _endings(variant: VariantCounts) -> EndingsView:
+    view: EndingsView = {
+        'success': variant.of('ended in success').trials,
+        'failure': variant.of('ended in failure').trials,
+        'preempted': variant.of('preempted').trials,
+        'unfinished': variant.of('unfinished').trials,
+    }
+    if variant.has(OTHER_END):
+        view['other'] = variant.of(OTHER_END).trials
+    return view
+
+
+def _count(count: Count) -> CountView:
     return {'trials': count.trials, 'events': count.events}

@@ -4,16 +4,13 @@ Definitions: doc/statistics.md.
 """
 
 from collections import Counter
-from typing import Any, Dict, Iterable, List, Sequence, Tuple, Union
+from typing import Dict, Iterable, List, Mapping, Sequence, Tuple, Union
 
 from smach_oracle.analysis.counting.trial_summary import TrialSummary
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 
 from ..feeds.told_trials import ToldTrial
-
-ENDINGS = (TrialEnding.SUCCESS, TrialEnding.FAILURE, TrialEnding.OTHER, TrialEnding.PREEMPTED)
-COUNTED = ('failures', 'recoveries', 'questions', 'answered')
-
+from ..shapes.trials import CountsRowView, CountView, EndingsView
 
 Counted = Union[TrialCounter, ToldTrial]
 
@@ -23,7 +20,7 @@ def has_oracle(counter: Counted) -> bool:
     return counter.recovers is not False
 
 
-def counts_table(trials: Iterable[Counted]) -> List[Dict[str, Any]]:
+def counts_table(trials: Iterable[Counted]) -> List[CountsRowView]:
     """Return how many trials had each thing at least once, and how often it happened in all.
 
     Counted by experiment and by with or without oracle, over the trials that have ended.
@@ -36,20 +33,31 @@ def counts_table(trials: Iterable[Counted]) -> List[Dict[str, Any]]:
     return [_row(experiment, oracle, groups[experiment, oracle]) for experiment, oracle in in_order]
 
 
-def _row(experiment: str, oracle: bool, trials: Sequence[Counted]) -> Dict[str, Any]:
-    endings = Counter(trial.ending for trial in trials)
+def _row(experiment: str, oracle: bool, trials: Sequence[Counted]) -> CountsRowView:
     return {
         'experiment': experiment,
         'oracle': oracle,
         'trials': len(trials),
-        'endings': {
-            ending.value: endings[ending]
-            for ending in ENDINGS
-            if ending is not TrialEnding.OTHER or endings[ending]
+        'endings': _endings(Counter(trial.ending for trial in trials)),
+        'counts': {
+            'failures': _count([trial.failures for trial in trials]),
+            'recoveries': _count([trial.recoveries for trial in trials]),
+            'questions': _count([trial.questions for trial in trials]),
+            'answered': _count([trial.answered for trial in trials]),
         },
-        'counts': {name: _count([getattr(trial, name) for trial in trials]) for name in COUNTED},
         'unwell_s': unwell(trials),
     }
+
+
+def _endings(found: Mapping[TrialEnding, int]) -> EndingsView:
+    view: EndingsView = {
+        'success': found[TrialEnding.SUCCESS],
+        'failure': found[TrialEnding.FAILURE],
+        'preempted': found[TrialEnding.PREEMPTED],
+    }
+    if found[TrialEnding.OTHER]:
+        view['other'] = found[TrialEnding.OTHER]
+    return view
 
 
 def unwell(trials: Iterable[Union[Counted, TrialSummary]]) -> float:
@@ -57,5 +65,5 @@ def unwell(trials: Iterable[Union[Counted, TrialSummary]]) -> float:
     return round(sum(trial.unwell_s for trial in trials), 1)
 
 
-def _count(numbers: Sequence[int]) -> Dict[str, int]:
+def _count(numbers: Sequence[int]) -> CountView:
     return {'trials': sum(1 for number in numbers if number), 'events': sum(numbers)}

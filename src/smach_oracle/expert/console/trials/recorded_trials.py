@@ -4,25 +4,29 @@ import json
 import threading
 import time
 from collections import OrderedDict
-from typing import Any, Dict, List, Sequence, Set, Tuple
+from typing import Dict, List, Sequence, Set, Tuple
 
 from sensor_msgs.msg import CompressedImage
 
 from smach_oracle.analysis.bag_machines import FailureImage
 from smach_oracle.analysis.graphs.container_graph import ContainerGraph, drawing
+from smach_oracle.analysis.graphs.drawn_graph import GraphView
 from smach_oracle.analysis.graphs.recorded import graph_from_events, recorded_graphs
 from smach_oracle.ros.log.said_once import warn_once
 
 from ..feeds.views import event_view
 from ..graphs.layout_worker import LayoutWorker
 from ..sensors.question_images import ImageStore, image_view, stored_images
+from ..shapes.basics import ByPath
+from ..shapes.questions import KeptImageView
+from ..shapes.trials import RecordedTrialView
 from .bag_catalogue import BagCatalogue, BagTrial, RecordedTrialError
 
 MOST_EVENTS = 20000  # of a trial: the first ones
 LAYOUT_WAIT_S = 8.0
 REMEMBERED = 4
 MOST_BYTES = 20000000  # of what is sent
-ImagesByQuestion = Dict[str, List[Dict[str, Any]]]  # as of image_view
+ImagesByQuestion = Dict[str, List[KeptImageView]]
 
 
 class RecordedTrials:
@@ -54,7 +58,7 @@ class RecordedTrials:
                     self._known.popitem(last=False)
             return self._known[key]
 
-    def _content(self, trial: BagTrial) -> Dict[str, Any]:
+    def _content(self, trial: BagTrial) -> RecordedTrialView:
         read = self._catalogue.replayed(trial, MOST_EVENTS)
         if read.problem:
             warn_once('Machines in {} cannot be read: {}'.format(trial.summary.bags, read.problem))
@@ -82,7 +86,7 @@ class RecordedTrials:
                 )
         return images
 
-    def _graphs(self, structures: Dict[str, ContainerGraph]) -> Dict[str, Any]:
+    def _graphs(self, structures: Dict[str, ContainerGraph]) -> ByPath[GraphView]:
         """Drawings of the containers, after waiting a little for dot."""
         found = {}
         until_s = time.monotonic() + LAYOUT_WAIT_S

@@ -6,7 +6,7 @@ Thread-safe, bounded.
 import json
 import threading
 from collections import OrderedDict
-from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+from typing import List, Optional, Sequence, Tuple, Union
 
 from smach_oracle.analysis.trial_counter import TrialCounter, TrialEnding
 from smach_oracle.oracle.records.events import Event, EventKind
@@ -14,6 +14,7 @@ from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
 
 from ..feeds.told_trials import ToldTrial
 from ..feeds.views import event_view
+from ..shapes.trials import TrialOverviewView, TrialView
 from .counts_table import counts_table, has_oracle
 from .packed_texts import PackedTexts
 from .recovery_statistics import RecoveryCounts, RecoveryStatistics
@@ -124,7 +125,7 @@ class TrialLog:
                 if trial.robot == robot and not trial.ended:
                     trial.missing = GONE
 
-    def overview(self) -> Dict[str, Any]:
+    def overview(self) -> TrialOverviewView:
         """Return the table of counts and the latest trials, newest first, as plain data."""
         with self._lock:
             latest = list(self._trials.items())[-SHOWN_TRIALS:]
@@ -208,7 +209,7 @@ class TrialLog:
         trial.events.clear()
 
 
-def _row(trial_id: str, trial: _LoggedTrial) -> Dict[str, Any]:
+def _row(trial_id: str, trial: _LoggedTrial) -> TrialView:
     counts = trial.counts
     outcome = counts.outcome
     if not trial.ended:

@@ -5,7 +5,7 @@ as its robot knows them. This has those of the containers around.
 """
 
 from collections import OrderedDict, deque
-from typing import Deque, Dict, List, NamedTuple, Set, Tuple
+from typing import Deque, Dict, Final, List, NamedTuple, Set, Tuple
 
 from smach_oracle.analysis.replaying.followed import Preempts
 from smach_oracle.oracle.records.events import Event, EventKind, FailureKind
@@ -13,6 +13,7 @@ from smach_oracle.oracle.records.facts import UNCOUNTED, branches_of, last_store
 from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 
+from ..shapes.questions import Missing
 from .recovery_statistics import takes_out
 
 MOST_VISITS = 24  # of a container
@@ -20,7 +21,9 @@ MOST_LEVELS = 32  # of a trial
 MOST_TRIALS = 100
 _MOST_PATHS = 200  # that are remembered after a gap
 _LONGEST = 200
-UNHEARD, OLDER = 'unheard', 'older'  # why visits are missing before those that are known
+# why visits are missing before those that are known
+UNHEARD: Final = 'unheard'
+OLDER: Final = 'older'
 
 
 class Level(NamedTuple):
@@ -29,15 +32,15 @@ class Level(NamedTuple):
     path: str
     state: str
     visits: Tuple[Visit, ...]
-    missing: str  # 'unheard', 'older', or '' where none is missing before these
+    missing: Missing  # '' where none is missing before these
 
 
 class _RunningContainer:
     """A container that runs."""
 
-    def __init__(self, missing: str, branches: Tuple[str, ...] = ()) -> None:
+    def __init__(self, missing: Missing, branches: Tuple[str, ...] = ()) -> None:
         self.visits: Deque[Visit] = deque(maxlen=MOST_VISITS)
-        self.missing = missing
+        self.missing: Missing = missing
         self.branches = branches  # states with visits of their own, as those of a Concurrence
         self.begun: Set[str] = set()  # states whose visit has not ended
         self.preempts = Preempts()

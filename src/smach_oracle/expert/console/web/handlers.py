@@ -1,12 +1,13 @@
 """HTTP handlers of the page and the session. Every request passes the same access control first."""
 
 import json
-from typing import Any, Callable, Dict, Optional, Protocol
+from typing import Callable, Optional, Protocol
 
 import tornado.web
 
 from smach_oracle.oracle.records.short_text import shortened
 
+from ..shapes.page import SessionView
 from . import sessions
 from .access import ClientRateLimits, Identity, network_of
 from .access_control import AccessControl
@@ -215,7 +216,7 @@ class SessionHandler(CheckedHandler):
 
     def _answer(self, session: BrowserSession) -> None:
         identity = self.access.identity(session)
-        known: Dict[str, Any] = {
+        known: SessionView = {
             'signed_in': identity is not None,
             'role': identity.role if identity else '',
             'name': identity.name if identity else '',

@@ -157,14 +157,14 @@ def test_the_page_is_told_of_the_mask_the_place_and_the_size():
     )
     info = marked_view(answer)
     cloud = info['object'].pop('cloud')
-    assert (cloud['count'], cloud['offset'], cloud['scale'][0]) == (2, [1, 2, 3], 1)
+    assert (cloud['count'], cloud['offset'], cloud['scale'][0]) == (2, (1, 2, 3), 1)
     assert base64.b64decode(cloud['data'])[12:] == b'\7' * 6
     assert info['object'] == {
         'frame': 'base',
-        'position': [1, 2, 3],
+        'position': (1, 2, 3),
         'yaw': 0.5,
         'points': 2,
-        'size': [0.1, 0.2, 0.0],
+        'size': (0.1, 0.2, 0.0),
     }
     drawn = np.zeros(mask.shape, np.uint8)
     cv2.drawContours(

@@ -44,8 +44,8 @@ def view(rule=BY_NAME, **changes):
 
 
 def test_a_question_is_told_whole():
-    shown = view()
-    assert json.loads(json.dumps(shown, allow_nan=False)) == shown
+    shown = json.loads(json.dumps(view(), allow_nan=False))
+    assert shown.keys() == view().keys()
     assert (
         shown['key'],
         shown['state'],

@@ -160,8 +160,8 @@ def test_what_is_no_layout_is_refused(text):
 
 def test_a_transition_s_share_is_of_all_that_left_its_state():
     assert shares([('A', 'ok', 'B', 3), ('A', 'failure', 'ORACLE', 1), ('C', 'ok', 'D', 0)]) == [
-        ['A', 'ok', 'B', 3, 0.75],
-        ['A', 'failure', 'ORACLE', 1, 0.25],
+        ('A', 'ok', 'B', 3, 0.75),
+        ('A', 'failure', 'ORACLE', 1, 0.25),
     ]
 
 

@@ -2,8 +2,7 @@
 // commands.py checks every bit of it; test/unit/expert/console/test_console_types.py compares the
 // two.
 // Lengths are metres unless something else is written beside them.
-import { Vector } from './drawing/types';
-import { DriveFrame } from './server';
+import { DriveFrame, Marked, Vector } from './server';
 
 interface OfQuestion { question: string } // its key
 
@@ -84,20 +83,4 @@ export interface Reply<Name extends keyof Commands = keyof Commands> {
   ok: boolean;
   message: string;
   data?: Name extends keyof ReplyData ? ReplyData[Name] : never;
-}
-
-/** What a perception interface has made out. */
-export interface Marked {
-  outlines: number[][]; // x, y, x, y, ... px of each line around the mask
-  elapsed: number; // s
-  object?: MarkedObject;
-}
-
-export interface MarkedObject {
-  frame: string;
-  position: Vector;
-  yaw: number; // rad
-  points: number;
-  size: Vector;
-  cloud: { kind: 'cloud'; count: number; of: number; offset: Vector; scale: Vector; data: string };
 }

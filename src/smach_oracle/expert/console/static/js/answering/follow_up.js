@@ -8,7 +8,7 @@ import { redraw } from '../page/redraw.js';
 
 /** @typedef {import('../page/types').App} App */
 /** @typedef {import('../server').Answer} Answer */
-/** @typedef {import('../server').EventKind} EventKind */
+/** @typedef {import('../server').EventName} EventKind */
 /** @typedef {import('../server').EventSlice} EventSlice */
 /** @typedef {import('../server').Question} Question */
 /** @typedef {import('../server').TrialEvent} TrialEvent */

@@ -78,7 +78,7 @@ export class Store {
 
   /**
    * @param {'trials' | 'bags'} name
-   * @param {import('../server').ListChange<unknown, Trial>} change
+   * @param {import('../server').TrialsChange | import('../server').BagsChange} change
    */
   withTrials(name, change) {
     const old = this.get(name);

@@ -4,7 +4,7 @@ import { unlessLost } from '../page/connection.js';
 import { h, options, replace, setText, toast } from '../page/dom.js';
 
 /** @typedef {import('../page/types').App} App */
-/** @typedef {import('../down').DownMachine} DownMachine */
+/** @typedef {import('../server').DownMachine} DownMachine */
 /** @typedef {'goto_stored' | 'edit_stored' | 'drop_stored'} Change */
 
 const NEEDS_ROLE = 'To change it needs the role of an operator.';

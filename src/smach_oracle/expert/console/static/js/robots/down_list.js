@@ -6,7 +6,7 @@ import { arrange } from '../page/redraw.js';
 import { DownMachineView } from './down_machine.js';
 
 /** @typedef {import('../page/types').App} App */
-/** @typedef {import('../down').DownMachine} DownMachine */
+/** @typedef {import('../server').DownMachine} DownMachine */
 
 export class DownList {
   /** @param {App} app */

@@ -6,7 +6,7 @@ import { redraw } from '../page/redraw.js';
 import { DownChanges } from './down_changes.js';
 
 /** @typedef {import('../page/types').App} App */
-/** @typedef {import('../down').DownMachine} DownMachine */
+/** @typedef {import('../server').DownMachine} DownMachine */
 
 const GOES_ON = 'Goes on when its program is started again. By default it asks a person first.';
 const TO_LOOK = 'To look closer, on the computer of its store:';

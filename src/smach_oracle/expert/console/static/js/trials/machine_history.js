@@ -2,7 +2,7 @@
 // The state of a machine at a moment of a trial, derived from the trial's events alone. Pure.
 
 /** @typedef {import('../robots/types').MachineState} MachineState */
-/** @typedef {import('../server').EventKind} EventKind */
+/** @typedef {import('../server').EventName} EventKind */
 /** @typedef {import('../server').TransitionCount} TransitionCount */
 /** @typedef {import('../server').TrialEvent} TrialEvent */
 /** @typedef {import('./types').Snapshot} Snapshot */

@@ -1,7 +1,7 @@
 // @ts-check
 // What is on the time axis of a trial: lanes, bars, marks and ticks. Pure.
 
-/** @typedef {import('../server').EventKind} EventKind */
+/** @typedef {import('../server').EventName} EventKind */
 /** @typedef {import('../server').TrialEvent} TrialEvent */
 /** @typedef {import('./types').Bar} Bar */
 
