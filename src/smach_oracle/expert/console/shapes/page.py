@@ -36,7 +36,7 @@ class SessionView(TypedDict):
     xsrf: str
 
 
-# Named pieces of what the pages show; each comes whole, but for the lists. A name in capital words
+# Named pieces of what the pages show; each comes whole, except the lists. A name in capital words
 # stands for all that begin like it.
 SectionsView = TypedDict(
     'SectionsView',

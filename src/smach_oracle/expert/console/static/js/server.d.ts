@@ -39,7 +39,7 @@ export interface Session {
   xsrf: string;
 }
 
-/** Named pieces of what the pages show; each comes whole, but for the lists. A name in capital
+/** Named pieces of what the pages show; each comes whole, except the lists. A name in capital
  * words stands for all that begin like it.
  */
 export interface Sections {
