@@ -4,11 +4,11 @@ process takes, as a share of one core.
 
     benchmarks/introspection.py [--upstream PATH] [--containers N] [--seconds S] [--check]
 
-Each row is a node of its own on a master of the benchmark's own: without a server, with ours, and
-with that of the checkout of executive_smach at PATH, on that checkout's engine. A viewer runs as
-another process, and reads structure and status of every container. What the node takes without a
-server is subtracted. The time is that of the process, not of the wall, so that a busy machine
-slows nothing but the benchmark. --check ends with status 1 where ours takes more than the limit,
+Each row is a node on a master of its own: without a server, with ours, and with that of the
+checkout of executive_smach at PATH, on that checkout's engine. A viewer runs as another process,
+and reads structure and status of every container. What the node takes without a server is
+subtracted. The time is that of the process, not of the wall, and the nodes are idle, so that all
+rows are measured at once. --check ends with status 1 where ours takes more than the limit,
 or the viewer misses a container.
 """
 
@@ -20,8 +20,11 @@ import subprocess
 import sys
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any, Dict, List, NamedTuple, Optional
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / 'test' / 'rostest'), str(ROOT / 'test')]
@@ -48,8 +51,7 @@ def main() -> int:
         return be_node(options)
     if options.role == 'viewer':
         return be_viewer(options)
-    with Master():
-        return report(measure_all(options), options)
+    return report(measure_all(options), options)
 
 
 def parse() -> argparse.Namespace:
@@ -75,30 +77,30 @@ def parse() -> argparse.Namespace:
     return parser.parse_args()
 
 
-class Master:
-    """A master on a free port, for all that is started after it."""
+@contextmanager
+def master() -> Iterator[Dict[str, str]]:
+    """A master on a free port. Yields the variables of those who are to use it."""
+    from own_master import wait_for_master
 
-    def __enter__(self) -> None:
-        from own_master import wait_for_master
+    from smach_oracle.experiment.launching import free_port
 
-        from smach_oracle.experiment.launching import free_port
-
-        port = free_port()
-        os.environ['ROS_MASTER_URI'] = 'http://localhost:{}'.format(port)
-        self._process = subprocess.Popen(
-            ['rosmaster', '--core', '-p', str(port)],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        wait_for_master(os.environ['ROS_MASTER_URI'])
-
-    def __exit__(self, *_error: Any) -> None:
-        self._process.send_signal(signal.SIGINT)
+    port = free_port()
+    uri = 'http://localhost:{}'.format(port)
+    process = subprocess.Popen(
+        ['rosmaster', '--core', '-p', str(port)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        wait_for_master(uri)
+        yield {'ROS_MASTER_URI': uri}
+    finally:
+        process.send_signal(signal.SIGINT)
         try:
-            self._process.wait(10)
+            process.wait(10)
         except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()
+            process.kill()
+            process.wait()
 
 
 # -- the rows
@@ -107,23 +109,31 @@ class Master:
 def measure_all(options: argparse.Namespace) -> Dict[str, Cost]:
     """Measure the cost of each row."""
     rows = {
-        'no server': measure(options, 'none', viewed=False),
-        'ours': measure(options, 'ours', viewed=False),
-        'ours, with a viewer': measure(options, 'ours', viewed=True),
-        'ours, wrapped, with a viewer': measure(options, 'ours', viewed=True, wrapped=True),
+        'no server': partial(measure, options, 'none', viewed=False),
+        'ours': partial(measure, options, 'ours', viewed=False),
+        'ours, with a viewer': partial(measure, options, 'ours', viewed=True),
+        'ours, wrapped, with a viewer': partial(
+            measure, options, 'ours', viewed=True, wrapped=True
+        ),
     }
     if options.upstream:
         from harness.upstream import environment
 
         upstream = environment(Path(options.upstream).resolve())
-        rows['upstream'] = measure(options, 'upstream', viewed=False, more_env=upstream)
-        rows['upstream, with a viewer'] = measure(
-            options, 'upstream', viewed=True, more_env=upstream
+        rows['upstream'] = partial(measure, options, 'upstream', viewed=False, more_env=upstream)
+        rows['upstream, with a viewer'] = partial(
+            measure, options, 'upstream', viewed=True, more_env=upstream
         )
-        rows["ours on upstream's engine, wrapped, with a viewer"] = measure(
-            options, 'ours', viewed=True, wrapped=True, more_env=upstream
+        rows["ours on upstream's engine, wrapped, with a viewer"] = partial(
+            measure, options, 'ours', viewed=True, wrapped=True, more_env=upstream
         )
-    return rows
+    with ExitStack() as closing, ThreadPoolExecutor(len(rows)) as pool:
+        masters = [closing.enter_context(master()) for _ in rows]
+        costs = {
+            name: pool.submit(row, on_master=on_master)
+            for (name, row), on_master in zip(rows.items(), masters)
+        }
+        return {name: cost.result() for name, cost in costs.items()}
 
 
 def measure(
@@ -132,11 +142,15 @@ def measure(
     viewed: bool,
     wrapped: bool = False,
     more_env: Optional[Dict[str, str]] = None,
+    *,
+    on_master: Dict[str, str],
 ) -> Cost:
     """Run one node, with a viewer perhaps."""
-    viewer = start(options, ['--role', 'viewer'], {}) if viewed else None
+    viewer = start(options, ['--role', 'viewer'], on_master) if viewed else None
     node = start(
-        options, ['--role', 'node', '--server', server] + ['--wrapped'] * wrapped, more_env or {}
+        options,
+        ['--role', 'node', '--server', server] + ['--wrapped'] * wrapped,
+        dict(on_master, **(more_env or {})),
     )
     try:
         told = json.loads(said(node))
