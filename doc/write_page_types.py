@@ -40,6 +40,7 @@ HEAD = """\
 // compares both with what the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 
+export as namespace server;
 export * from './commands';
 """
 PLAIN = {'str': 'string', 'int': 'number', 'float': 'number', 'bool': 'boolean', 'None': 'null'}

@@ -3,6 +3,7 @@
 // compares both with what the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 
+export as namespace server;
 export * from './commands';
 
 // --- basics

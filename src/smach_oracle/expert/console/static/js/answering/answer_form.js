@@ -12,22 +12,14 @@ import { outputFields, readOutputs } from './output_field.js';
 import { PreconditionList } from './precondition_list.js';
 import { justFailed, likeliest, stateLines } from './state_choices.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Answer} Answer */
-/** @typedef {import('../server').AnswerKind} AnswerKind */
-/** @typedef {import('../server').OutcomeChoice} OutcomeChoice */
-/** @typedef {import('../server').PreconditionStatus} PreconditionStatus */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').StateChoice} StateChoice */
-
 const MOST_AT_ONCE = 12; // states
 const MOST_OPEN = 2; // outputs
 const REASON = 'Reason, for the record';
 
 export class AnswerForm {
   /**
-   * @param {Question} question
-   * @param {(answer: Answer) => void} onAnswer
+   * @param {server.Question} question
+   * @param {(answer: server.Answer) => void} onAnswer
    * @param {() => void} onBegin a person begins an answer that is not sent yet
    */
   constructor(question, onAnswer, onBegin) {
@@ -71,7 +63,7 @@ export class AnswerForm {
 
   /**
    * Whether the preconditions of states hold.
-   * @param {{ [state: string]: PreconditionStatus[] | undefined }} statuses
+   * @param {{ [state: string]: server.PreconditionStatus[] | undefined }} statuses
    * @param {number} now by the server's clock
    */
   showPreconditions(statuses, now) {
@@ -91,7 +83,7 @@ export class AnswerForm {
   }
 
   /**
-   * @param {AnswerKind} kind
+   * @param {server.AnswerKind} kind
    * @param {string} name
    * @param {string} [container] of a state or an outcome that is another container's
    */
@@ -102,7 +94,7 @@ export class AnswerForm {
   }
 
   /**
-   * @param {AnswerKind} kind
+   * @param {server.AnswerKind} kind
    * @param {string} name
    * @param {string} container
    */
@@ -118,10 +110,10 @@ export class AnswerForm {
 
   /**
    * One button.
-   * @param {AnswerKind} kind
+   * @param {server.AnswerKind} kind
    * @param {string} name of the state, outcome or interface
    * @param {string} key that presses it, '' for none
-   * @param {Child} words
+   * @param {page.Child} words
    * @param {string} [container] of a state that is another container's
    * @param {() => void} [ask] comes before it is sent
    */
@@ -137,7 +129,7 @@ export class AnswerForm {
     return button;
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   goTo() {
     const choices = this.question.choices.filter(({ container }) => !container);
     const first = choices.length <= MOST_AT_ONCE ? choices : likeliest(this.question);
@@ -147,7 +139,7 @@ export class AnswerForm {
     this.elsewhere()];
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   elsewhere() {
     const choices = this.question.choices.filter(({ container }) => container);
     return choices.length > 0 && h('div', { class: 'elsewhere' },
@@ -155,19 +147,19 @@ export class AnswerForm {
         : choices.length + ' states of other containers'));
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   preemptHint() {
     const { state, running } = this.question;
     return running && h('span', { class: 'dim' },
       ' · every answer but to wait on preempts ', state);
   }
 
-  /** @param {StateChoice[]} choices */
+  /** @param {server.StateChoice[]} choices */
   otherStates(choices) { return this.folded(choices, choices.length + ' more states'); }
 
   /**
    * States in a list that is opened on demand.
-   * @param {StateChoice[]} choices
+   * @param {server.StateChoice[]} choices
    * @param {string} title
    */
   folded(choices, title) {
@@ -185,7 +177,7 @@ export class AnswerForm {
   }
 
   /**
-   * @param {StateChoice} choice
+   * @param {server.StateChoice} choice
    * @param {string} key
    */
   state(choice, key) {
@@ -203,7 +195,7 @@ export class AnswerForm {
     return button;
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   interfaces() {
     const { interfaces } = this.question;
     return interfaces.length > 0 && [h('h4', {}, 'Do it through an interface'),
@@ -212,7 +204,7 @@ export class AnswerForm {
           description && h('span', { class: 'dim' }, description)]))))];
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   supersede() {
     const { supersede, state } = this.question;
     const { outputs } = this;
@@ -222,7 +214,7 @@ export class AnswerForm {
       choicesBox(supersede.map((choice) => this.outcome(choice)), 'short')];
   }
 
-  /** @param {OutcomeChoice} choice */
+  /** @param {server.OutcomeChoice} choice */
   outcome(choice) {
     const { outcome, target, meaning } = choice;
     const key = choice === successOf(this.question.supersede) ? 's' : '';

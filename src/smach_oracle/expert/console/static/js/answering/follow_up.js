@@ -6,19 +6,13 @@ import { focusIsFree, moveFocus } from '../page/focus.js';
 import { added } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Answer} Answer */
-/** @typedef {import('../server').EventName} EventKind */
-/** @typedef {import('../server').EventSlice} EventSlice */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
 /**
  * Where one may go from a question: to the list, or to another one, by its key and whether that was
  * meant.
  * @typedef {{ leave: () => void, choose: (key: string, meant: boolean) => void }} Ways
  */
 
-/** @type {Set<EventKind>} */
+/** @type {Set<server.EventName>} */
 const SHOWN = new Set(['jump', 'supersede', 'give_up', 'interface_start', 'interface_end',
   'precondition_start', 'precondition_end', 'warning', 'state_start', 'transition', 'failure',
   'trial_end', 'query_opened', 'health_wait_start', 'health_wait_end', 'hold_start', 'hold_end',
@@ -29,20 +23,20 @@ const HELD = 'It waits until somebody lets it go on.';
 
 export class FollowUp {
   /**
-   * @param {App} app
-   * @param {Question} question
+   * @param {page.App} app
+   * @param {server.Question} question
    * @param {Ways} ways
    */
   constructor(app, question, ways) {
     this.app = app;
     this.question = question;
     this.ways = ways;
-    /** @type {TrialEvent[]} */
+    /** @type {server.TrialEvent[]} */
     this.events = []; // of the question's trial
-    /** @type {TrialEvent | null} */
+    /** @type {server.TrialEvent | null} */
     this.last = null; // with which it is over: the trial's end, or the next question
     this.since = 0; // ms, since the answer; 0 before
-    /** @type {TrialEvent[]} */
+    /** @type {server.TrialEvent[]} */
     this.shown = [];
     /** @type {HTMLElement[]} */
     this.given = []; // what this has put the focus on: it may take it on from there
@@ -59,7 +53,7 @@ export class FollowUp {
     this.stop = app.store.onEvents((slice) => this.take(slice));
   }
 
-  /** @param {Pick<Answer, 'kind' | 'name' | 'container'>} answer */
+  /** @param {Pick<server.Answer, 'kind' | 'name' | 'container'>} answer */
   begin(answer) {
     const { state, running } = this.question;
     const gaveUp = answer.kind === 'give_up';
@@ -79,7 +73,7 @@ export class FollowUp {
     this.app.connection.request('watch', { trial: this.question.trial }).catch(() => {});
   }
 
-  /** @param {EventSlice} slice */
+  /** @param {server.EventSlice} slice */
   take({ trial, from, events }) {
     if (!this.since || trial !== this.question.trial || from > this.events.length) return;
     this.events = this.events.slice(0, from).concat(events);
@@ -92,10 +86,10 @@ export class FollowUp {
     this.show(end < 0 ? after : after.slice(0, end + 1));
   }
 
-  /** @param {TrialEvent} event */
+  /** @param {server.TrialEvent} event */
   ends({ kind }) { return kind === 'trial_end' || kind === 'query_opened'; }
 
-  /** @param {TrialEvent[]} steps */
+  /** @param {server.TrialEvent[]} steps */
   show(steps) {
     const hidden = Math.max(0, steps.length - MOST_SHOWN);
     setText(this.earlier, hidden ? hidden + ' earlier steps are left out.' : '');
@@ -108,7 +102,7 @@ export class FollowUp {
     this.showNext();
   }
 
-  /** @param {TrialEvent[]} steps */
+  /** @param {server.TrialEvent[]} steps */
   hintOf(steps) {
     const gone = this.last ? '' : this.app.liveness.gone(this.question);
     if (gone) return gone;
@@ -168,8 +162,8 @@ export class FollowUp {
 }
 
 /**
- * @param {Pick<Answer, 'kind' | 'name' | 'container'>} answer
- * @param {Question} question
+ * @param {Pick<server.Answer, 'kind' | 'name' | 'container'>} answer
+ * @param {server.Question} question
  */
 function answerWords({ kind, name, container }, { state, path }) {
   if (kind === 'goto') return 'go to ' + (container ? container + '/' : '') + name;

@@ -4,19 +4,17 @@
 import { h, replace, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Question} Question */
 /**
  * Makes a button of the form: the outcome, its key, its words, and what it asks. It sends nothing.
- * @typedef {(outcome: string, key: string, words: Child, act: () => void) => HTMLButtonElement}
- *   MakeButton
+ * @typedef {(outcome: string, key: string, words: page.Child,
+ *   act: () => void) => HTMLButtonElement} MakeButton
  */
 
 const UNDO_S = 5;
 
 export class GiveUp {
   /**
-   * @param {Question} question
+   * @param {server.Question} question
    * @param {MakeButton} makeButton
    * @param {{ send: (outcome: string, container: string) => void, begin: () => void,
    *   changed: () => void }} use `begin`: it was confirmed; `changed`: whether it is about to be
@@ -41,7 +39,7 @@ export class GiveUp {
 
   /**
    * @param {MakeButton} makeButton
-   * @returns {Child}
+   * @returns {page.Child}
    */
   buildChoices(makeButton) {
     const { path, give_up: outcomes, running } = this.question;

@@ -1,17 +1,15 @@
 // @ts-check
 // What the outcomes of a state mean: which one says that its work is done.
 
-/** @typedef {import('../server').OutcomeChoice} OutcomeChoice */
-
 const USUAL = 'succeeded';
-/** @type {{ [meaning in OutcomeChoice['meaning']]: string }} */
+/** @type {{ [meaning in server.OutcomeChoice['meaning']]: string }} */
 export const MEANINGS = { success: '', failure: 'counts as a failure',
   preempted: 'counts as stopped', 'other end': '' };
 
 /**
  * The one outcome that says that the work is done; undefined where none does, or several do and
  * none has the usual name.
- * @param {OutcomeChoice[]} choices
+ * @param {server.OutcomeChoice[]} choices
  */
 export function successOf(choices) {
   const good = choices.filter(({ meaning }) => meaning === 'success');

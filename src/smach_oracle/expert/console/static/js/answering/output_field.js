@@ -2,9 +2,6 @@
 // One output key of a state, to be filled in: its present value in the question says how.
 import { h, setText } from '../page/dom.js';
 
-/** @typedef {import('../server').Output} Output */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').UserdataItem} UserdataItem */
 /** @typedef {'list' | 'object' | 'number' | 'boolean' | 'text' | 'json'} PlainKind */
 /**
  * @typedef {object} Kind
@@ -50,7 +47,7 @@ function messageKind(type) {
 
 /**
  * What kind of plain value an item of the userdata has now.
- * @param {UserdataItem | undefined} item
+ * @param {server.UserdataItem | undefined} item
  * @returns {PlainKind}
  */
 function plainKindOf(item) {
@@ -70,7 +67,7 @@ function plainKindOf(item) {
 
 /**
  * The fields of all outputs of a question's state.
- * @param {Question} question
+ * @param {server.Question} question
  * @param {() => void} onInput
  */
 export function outputFields({ outputs, userdata }, onInput) {
@@ -96,7 +93,7 @@ export function readOutputs(fields, problem) {
 export class OutputField {
   /**
    * @param {string} key
-   * @param {UserdataItem | undefined} item of the userdata that has this key now
+   * @param {server.UserdataItem | undefined} item of the userdata that has this key now
    * @param {() => void} onInput something was typed
    */
   constructor(key, item, onInput) {
@@ -124,7 +121,7 @@ export class OutputField {
 
   /**
    * null where it is not set. Throws an Error that says what is allowed.
-   * @returns {Output | null}
+   * @returns {server.Output | null}
    */
   read() {
     const typed = this.input.value.trim();

@@ -3,7 +3,6 @@
 import { h, setText } from '../page/dom.js';
 import { duration } from '../page/format.js';
 
-/** @typedef {import('../server').PreconditionStatus} PreconditionStatus */
 /** @typedef {{ [part in 'root' | 'sign' | 'word' | 'why']: HTMLElement }} Item */
 
 const STALE_S = 8;
@@ -12,7 +11,7 @@ const DOES_NOT_HOLD = { sign: '✗', word: 'does not hold', kind: 'bad' };
 const UNKNOWN = { sign: '?', word: 'unknown', kind: '' };
 const UNTOLD = { sign: '', word: '', kind: '' };
 
-/** @param {PreconditionStatus | undefined} status */
+/** @param {server.PreconditionStatus | undefined} status */
 function wordsOf(status) {
   if (!status) return UNTOLD;
   if (status.holds === null) return UNKNOWN;
@@ -21,7 +20,7 @@ function wordsOf(status) {
 
 /**
  * Without the name, which stands before it.
- * @param {PreconditionStatus | undefined} status
+ * @param {server.PreconditionStatus | undefined} status
  */
 function reasonOf(status) {
   if (!status || status.holds === true || !status.text) return '';
@@ -42,7 +41,7 @@ export class PreconditionList {
 
   /**
    * Only their names where the robot publishes nothing.
-   * @param {PreconditionStatus[] | undefined} statuses in the same order
+   * @param {server.PreconditionStatus[] | undefined} statuses in the same order
    * @param {number} now by the server's clock
    */
   show(statuses, now) {
@@ -70,7 +69,7 @@ function itemOf(name) {
 
 /**
  * @param {Item} item
- * @param {PreconditionStatus | undefined} status
+ * @param {server.PreconditionStatus | undefined} status
  * @param {string} stale a class
  */
 function showStatus(item, status, stale) {

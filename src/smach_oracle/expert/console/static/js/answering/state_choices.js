@@ -5,10 +5,7 @@ import {
   FAILURE_CLASSES, breakable, chip, counted, duration, percent, rateBar,
 } from '../page/format.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').StateChoice} StateChoice */
-/** @typedef {Pick<Question, 'state' | 'running' | 'history'>} Asked */
+/** @typedef {Pick<server.Question, 'state' | 'running' | 'history'>} Asked */
 
 const LIKELIEST = 6;
 const MOST_HELPFUL = 2;
@@ -16,10 +13,10 @@ const MOST_HELPFUL = 2;
 /**
  * The likeliest of very many states: the recommended one, those that helped before, the failed one,
  * the one that follows its success, and those that succeeded last.
- * @param {Question} question
+ * @param {server.Question} question
  */
 export function likeliest({ choices, state, supersede, history }) {
-  /** @param {StateChoice} choice */
+  /** @param {server.StateChoice} choice */
   const share = ({ helped: [helped, tried] }) => helped / tried;
   const helpful = choices.filter((choice) => choice.helped[0] > 0)
     .sort((one, other) => share(other) - share(one)).slice(0, MOST_HELPFUL);
@@ -37,9 +34,9 @@ export function likeliest({ choices, state, supersede, history }) {
 
 /**
  * What a button says of a state.
- * @param {StateChoice} choice
+ * @param {server.StateChoice} choice
  * @param {Asked} question
- * @returns {Child[]}
+ * @returns {page.Child[]}
  */
 export function stateLines(choice, question) {
   const { state: failed, running } = question;
@@ -58,7 +55,7 @@ export function stateLines(choice, question) {
 
 /**
  * What is to be expected of going there: how often that led on, else how often the state succeeds.
- * @param {StateChoice} choice
+ * @param {server.StateChoice} choice
  */
 function successBar({ success, helped: [helped, tried] }) {
   if (tried > 0) {
@@ -70,7 +67,7 @@ function successBar({ success, helped: [helped, tried] }) {
 
 /**
  * Where the count of the bar is from, or how long going there took.
- * @param {StateChoice} choice
+ * @param {server.StateChoice} choice
  * @param {string} failed the state that failed
  */
 function helpedChip({ helped: [helped, tried], helped_s: seconds }, failed) {
@@ -84,7 +81,7 @@ function helpedChip({ helped: [helped, tried], helped_s: seconds }, failed) {
 /**
  * The precondition of a state that has just failed: what the question is about, or what the last
  * visit to it ended in. '' where none has.
- * @param {StateChoice} choice
+ * @param {server.StateChoice} choice
  * @param {Asked} question
  */
 export function justFailed({ preconditions }, { state, running, history }) {
@@ -95,9 +92,9 @@ export function justFailed({ preconditions }, { state, running, history }) {
 }
 
 /**
- * @param {StateChoice} choice
+ * @param {server.StateChoice} choice
  * @param {Asked} question
- * @returns {Child[]}
+ * @returns {page.Child[]}
  */
 function stateChips(choice, question) {
   const { class: rank, blocked, repeats, missing, visits, recommended } = choice;

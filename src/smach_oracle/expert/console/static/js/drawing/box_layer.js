@@ -2,27 +2,21 @@
 // The box around an object in a scene.
 import { boxAround, chained, cornersOf, placed, vector } from './transforms.js';
 
-/** @typedef {import('./types').Colour} Colour */
-/** @typedef {import('./types').Layer} Layer */
-/** @typedef {import('./types').Paper} Paper */
-/** @typedef {import('./types').Pose} Pose */
-/** @typedef {import('./types').Vector} Vector */
-/** @typedef {import('./types').View} View */
 /** @typedef {import('./raster.js').Raster} Raster */
 
-/** @type {Colour} */
+/** @type {drawing.Colour} */
 const EDGE = [124, 176, 255];
-/** @type {Colour[]} */
+/** @type {drawing.Colour[]} */
 const AXES = [[255, 80, 70], [70, 210, 110], [80, 130, 255]];
 
 /**
  * An upright box with its axes.
- * @implements {Layer}
+ * @implements {drawing.Layer}
  */
 export class BoxLayer {
   /**
-   * @param {{ position: Vector, yaw: number, size: Vector }} box yaw in rad
-   * @param {Pose | undefined} pose the scene from the box's frame; undefined: they are one
+   * @param {{ position: drawing.Vector, yaw: number, size: drawing.Vector }} box yaw in rad
+   * @param {drawing.Pose | undefined} pose the scene from the box's frame; undefined: they are one
    */
   constructor({ position: [x, y, z], yaw, size }, pose) {
     const [c, s] = [Math.cos(yaw), Math.sin(yaw)];
@@ -31,7 +25,7 @@ export class BoxLayer {
     this.size = size;
   }
 
-  /** @param {Vector} signs -1 or 1 along each axis */
+  /** @param {drawing.Vector} signs -1 or 1 along each axis */
   corner(signs) { return placed(this.at, vector((axis) => signs[axis] * this.size[axis] / 2)); }
 
   bounds() {
@@ -40,8 +34,8 @@ export class BoxLayer {
 
   /**
    * @param {Raster} raster
-   * @param {View} view
-   * @param {Paper} paper
+   * @param {drawing.View} view
+   * @param {drawing.Paper} paper
    */
   draw(raster, view, { ratio }) {
     const thick = Math.round(2 * ratio);

@@ -2,14 +2,6 @@
 // A point cloud in a scene.
 import { placed } from './transforms.js';
 
-/** @typedef {import('./types').Box} Box */
-/** @typedef {import('./types').Colour} Colour */
-/** @typedef {import('./types').Layer} Layer */
-/** @typedef {import('./types').Paper} Paper */
-/** @typedef {import('./types').Points} Points */
-/** @typedef {import('./types').Pose} Pose */
-/** @typedef {import('./types').Vector} Vector */
-/** @typedef {import('./types').View} View */
 /** @typedef {import('./raster.js').Raster} Raster */
 
 const LOOKED_AT = 2000; // points, to find out how large a cloud is
@@ -17,8 +9,8 @@ const LOOKED_AT = 2000; // points, to find out how large a cloud is
 /**
  * Points as the server sends them: positions, then colours.
  * @param {ArrayBuffer} data
- * @param {Pick<import('../server').CloudFacts, 'count' | 'offset' | 'scale'>} facts
- * @returns {Points}
+ * @param {Pick<server.CloudFacts, 'count' | 'offset' | 'scale'>} facts
+ * @returns {drawing.Points}
  */
 export function unpacked(data, { count, offset, scale }) {
   const raw = new Uint16Array(data, 0, 3 * count);
@@ -27,11 +19,11 @@ export function unpacked(data, { count, offset, scale }) {
   return { points, colours: new Uint8Array(data, raw.byteLength, 3 * count) };
 }
 
-/** @implements {Layer} */
+/** @implements {drawing.Layer} */
 export class CloudLayer {
   /**
-   * @param {Points} cloud its points are changed to where they are placed
-   * @param {Pose | undefined} pose the scene from the cloud; undefined: they are one
+   * @param {drawing.Points} cloud its points are changed to where they are placed
+   * @param {drawing.Pose | undefined} pose the scene from the cloud; undefined: they are one
    * @param {{ dim?: number, spacing?: number }} looks share of the background in its colours;
    *   size of a point in m
    */
@@ -52,7 +44,7 @@ export class CloudLayer {
 
   /**
    * The box without the outermost few points, which may be anywhere.
-   * @returns {Box}
+   * @returns {drawing.Box}
    */
   inner() {
     const step = 3 * Math.ceil(this.points.length / (3 * LOOKED_AT));
@@ -61,7 +53,7 @@ export class CloudLayer {
       Float32Array.from({ length }, (_, i) => this.points[i * step + axis]).sort()));
     /**
      * @param {number} share
-     * @returns {Vector}
+     * @returns {drawing.Vector}
      */
     const at = (share) => {
       const index = Math.round(share * (length - 1));
@@ -80,15 +72,15 @@ export class CloudLayer {
 
   /**
    * @param {Raster} raster
-   * @param {View} view
-   * @param {Paper} paper
+   * @param {drawing.View} view
+   * @param {drawing.Paper} paper
    */
   draw(raster, view, { ratio, ground }) {
     const colours = this.dim ? this.dimmed(ground) : this.colours;
     raster.points(view, this.points, colours, this.spacing, Math.max(1, Math.round(ratio)));
   }
 
-  /** @param {Colour} ground */
+  /** @param {drawing.Colour} ground */
   dimmed(ground) {
     if (String(ground) !== this.dimmedFor) {
       this.dimmedFor = String(ground);

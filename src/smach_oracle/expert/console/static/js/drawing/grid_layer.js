@@ -2,9 +2,6 @@
 // The floor of a scene.
 import { vector } from './transforms.js';
 
-/** @typedef {import('./types').Layer} Layer */
-/** @typedef {import('./types').Paper} Paper */
-/** @typedef {import('./types').View} View */
 /** @typedef {import('./raster.js').Raster} Raster */
 
 const GRID = 3; // m to each side
@@ -12,7 +9,7 @@ const DARK = 380; // sum of a colour: below it the lines are lighter than the gr
 
 /**
  * In squares of half a metre.
- * @implements {Layer}
+ * @implements {drawing.Layer}
  */
 export class GridLayer {
   /** @param {number} floor its height, m */
@@ -22,8 +19,8 @@ export class GridLayer {
 
   /**
    * @param {Raster} raster
-   * @param {View} view
-   * @param {Paper} paper
+   * @param {drawing.View} view
+   * @param {drawing.Paper} paper
    */
   draw(raster, view, { ground, ratio }) {
     const sign = ground[0] + ground[1] + ground[2] < DARK ? 1 : -1;

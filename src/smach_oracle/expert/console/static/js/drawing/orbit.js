@@ -3,10 +3,6 @@
 // move, the wheel or a pinch zooms; arrow keys turn, + and - zoom.
 import { vector } from './transforms.js';
 
-/** @typedef {import('./types').Looks} Looks */
-/** @typedef {import('./types').Vector} Vector */
-/** @typedef {import('./types').View} View */
-
 const FOCAL = 1.1; // of the height
 const FURTHEST = 200; // m
 const CLOSEST = 0.05;
@@ -23,7 +19,7 @@ export class Orbit {
   constructor(canvas, changed) {
     this.canvas = canvas;
     this.changed = changed;
-    /** @type {Vector} */
+    /** @type {drawing.Vector} */
     this.centre = [0, 0, 0];
     this.distance = 3;
     this.azimuth = -0.5;
@@ -42,9 +38,9 @@ export class Orbit {
   }
 
   /**
-   * @param {Vector} centre
+   * @param {drawing.Vector} centre
    * @param {number} distance m
-   * @param {Looks} looks
+   * @param {drawing.Looks} looks
    */
   look(centre, distance, { azimuth = -0.5, elevation = 0.45, optical = false }) {
     this.centre = centre;
@@ -57,14 +53,14 @@ export class Orbit {
 
   /**
    * Right, down and ahead on the screen, in the frame of what is seen.
-   * @returns {[Vector, Vector, Vector]}
+   * @returns {[drawing.Vector, drawing.Vector, drawing.Vector]}
    */
   axes() {
     const [ca, sa] = [Math.cos(this.azimuth), Math.sin(this.azimuth)];
     const [ce, se] = [Math.cos(this.elevation), Math.sin(this.elevation)];
     /**
-     * @param {Vector} axis
-     * @returns {Vector}
+     * @param {drawing.Vector} axis
+     * @returns {drawing.Vector}
      */
     const own = ([x, y, z]) => (this.optical ? [-y, -z, x] : [x, y, z]);
     return [own([sa, -ca, 0]), own([ca * -se, sa * -se, -ce]), own([ca * ce, sa * ce, -se])];
@@ -73,7 +69,7 @@ export class Orbit {
   /**
    * @param {number} width px
    * @param {number} height px
-   * @returns {View}
+   * @returns {drawing.View}
    */
   view(width, height) {
     const [right, down, ahead] = this.axes();

@@ -2,12 +2,6 @@
 // Draws points, triangles and lines in 3D into pixels, each with a depth of its own; needs nothing
 // of the graphics card.
 
-/** @typedef {import('./types').Colour} Colour */
-/** @typedef {import('./types').Geometry} Geometry */
-/** @typedef {import('./types').Pose} Pose */
-/** @typedef {import('./types').Vector} Vector */
-/** @typedef {import('./types').View} View */
-
 const NEAREST = 0.02; // m
 const LIGHT = [-0.32, -0.64, -0.7]; // from the left, above, and the viewer
 const MOST_STEPS = 4000; // px along a line
@@ -35,7 +29,7 @@ export class Raster {
 
   /**
    * Squares.
-   * @param {View} view
+   * @param {drawing.View} view
    * @param {Float32Array} points x, y, z, ...
    * @param {Uint8Array} colours red, green, blue, ...
    * @param {number} size of a square, m
@@ -81,10 +75,10 @@ export class Raster {
   }
 
   /**
-   * @param {View} view
-   * @param {Geometry} geometry
-   * @param {Pose} pose the scene from the geometry
-   * @param {Colour} colour
+   * @param {drawing.View} view
+   * @param {drawing.Geometry} geometry
+   * @param {drawing.Pose} pose the scene from the geometry
+   * @param {drawing.Colour} colour
    */
   mesh(view, { corners, triangles }, pose, colour) {
     this.project(view, corners, composed(view, pose));
@@ -94,7 +88,7 @@ export class Raster {
   }
 
   /**
-   * @param {View} view
+   * @param {drawing.View} view
    * @param {Float32Array} corners
    * @param {Float32Array} camera the camera from the corners
    */
@@ -118,7 +112,7 @@ export class Raster {
    * @param {number} a places of its corners in `projected`
    * @param {number} b
    * @param {number} c
-   * @param {Colour} colour
+   * @param {drawing.Colour} colour
    */
   triangle(a, b, c, colour) {
     const s = this.projected;
@@ -152,10 +146,10 @@ export class Raster {
   }
 
   /**
-   * @param {View} view
-   * @param {Vector} from
-   * @param {Vector} to
-   * @param {Colour} colour
+   * @param {drawing.View} view
+   * @param {drawing.Vector} from
+   * @param {drawing.Vector} to
+   * @param {drawing.Colour} colour
    * @param {number} thick px
    * @param {number} front 1 + how much nearer it is drawn than it is
    */
@@ -180,9 +174,9 @@ export class Raster {
 
   /**
    * Pixels, and 1 / depth, of a point at the camera.
-   * @param {View} view
-   * @param {Vector} point
-   * @returns {Vector}
+   * @param {drawing.View} view
+   * @param {drawing.Vector} point
+   * @returns {drawing.Vector}
    */
   onScreen(view, [x, y, z]) {
     return [this.width / 2 + view.focal * x / z, this.height / 2 + view.focal * y / z, 1 / z];
@@ -199,8 +193,8 @@ function packed(red, green, blue) { return 0xff000000 | blue << 16 | green << 8 
 
 /**
  * The camera from what is at a pose of the scene.
- * @param {View} view
- * @param {Pose} pose
+ * @param {drawing.View} view
+ * @param {drawing.Pose} pose
  */
 function composed({ right, down, ahead, centre, distance }, pose) {
   const found = new Float32Array(12);
@@ -218,21 +212,21 @@ function composed({ right, down, ahead, centre, distance }, pose) {
 
 /**
  * A point at the camera.
- * @param {View} view
- * @param {Vector} point
- * @returns {Vector}
+ * @param {drawing.View} view
+ * @param {drawing.Vector} point
+ * @returns {drawing.Vector}
  */
 function seen({ right, down, ahead, centre, distance }, point) {
   const [x, y, z] = [point[0] - centre[0], point[1] - centre[1], point[2] - centre[2]];
-  /** @param {Vector} axis */
+  /** @param {drawing.Vector} axis */
   const along = (axis) => axis[0] * x + axis[1] * y + axis[2] * z;
   return [along(right), along(down), along(ahead) + distance];
 }
 
 /**
  * Move a point that is behind the camera to before it.
- * @param {Vector} point
- * @param {Vector} towards
+ * @param {drawing.Vector} point
+ * @param {drawing.Vector} towards
  */
 function clip(point, towards) {
   if (point[2] >= NEAREST) return;
@@ -246,7 +240,7 @@ function clip(point, towards) {
  * @param {number} a places of its corners in `s`
  * @param {number} b
  * @param {number} c
- * @param {Colour} colour
+ * @param {drawing.Colour} colour
  */
 function lit(s, a, b, c, colour) {
   const [x1, y1, z1] = [s[b] - s[a], s[b + 1] - s[a + 1], s[b + 2] - s[a + 2]];

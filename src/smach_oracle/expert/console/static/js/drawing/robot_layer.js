@@ -2,17 +2,12 @@
 // A robot in a scene: the geometries of its links, at their poses.
 import { boxAround, chained, cornersOf, placed } from './transforms.js';
 
-/** @typedef {import('./types').Colour} Colour */
-/** @typedef {import('./types').Layer} Layer */
-/** @typedef {import('./types').Paper} Paper */
-/** @typedef {import('./types').RobotModel} RobotModel */
-/** @typedef {import('./types').View} View */
 /** @typedef {import('./raster.js').Raster} Raster */
 
-/** @implements {Layer} */
+/** @implements {drawing.Layer} */
 export class RobotLayer {
   /**
-   * @param {RobotModel} model
+   * @param {drawing.RobotModel} model
    * @param {Float32Array} poses of each link, one after the other
    */
   constructor(model, poses) {
@@ -40,8 +35,8 @@ export class RobotLayer {
 
   /**
    * @param {Raster} raster
-   * @param {View} view
-   * @param {Paper} paper
+   * @param {drawing.View} view
+   * @param {drawing.Paper} paper
    */
   draw(raster, view, { ground }) {
     for (const [link, geometry, pose, colour] of this.model.parts) {
@@ -51,9 +46,9 @@ export class RobotLayer {
   }
 
   /**
-   * @param {Colour} colour
-   * @param {Colour} ground
-   * @returns {Colour}
+   * @param {drawing.Colour} colour
+   * @param {drawing.Colour} ground
+   * @returns {drawing.Colour}
    */
   dimmed(colour, ground) {
     /** @param {number} i */

@@ -5,11 +5,6 @@ import { Orbit } from './orbit.js';
 import { Raster } from './raster.js';
 import { boxAround, diagonalOf, middleOf } from './transforms.js';
 
-/** @typedef {import('./types').Box} Box */
-/** @typedef {import('./types').Colour} Colour */
-/** @typedef {import('./types').Layer} Layer */
-/** @typedef {import('./types').Looks} Looks */
-
 const QUICK_MS = 30; // a scene drawn so quickly is drawn with twice the pixels, to be smooth
 const SLOW_MS = 110;
 
@@ -25,7 +20,7 @@ export class SceneView {
     this.buttons = h('div', { class: 'view-buttons' },
       h('button', { class: 'tool view-home', onclick: onHome }, 'Reset view'));
     this.root = h('div', { class: 'screen scene' }, this.canvas, this.note, this.buttons);
-    /** @type {Layer[]} */
+    /** @type {drawing.Layer[]} */
     this.layers = [];
     this.raster = new Raster();
     this.fine = 1; // px of the canvas for one px of the page
@@ -46,16 +41,16 @@ export class SceneView {
     this.note.hidden = !text;
   }
 
-  /** @param {(Layer | null | undefined | false)[]} layers */
+  /** @param {(drawing.Layer | null | undefined | false)[]} layers */
   show(layers) {
-    this.layers = /** @type {Layer[]} */ (layers.filter(Boolean));
+    this.layers = /** @type {drawing.Layer[]} */ (layers.filter(Boolean));
     this.schedule();
   }
 
   /**
    * Look at all of some boxes from a usual side.
-   * @param {(Box | null)[]} boxes
-   * @param {Looks & { reach?: number }} looks reach: distance in units of their size
+   * @param {(drawing.Box | null)[]} boxes
+   * @param {drawing.Looks & { reach?: number }} looks reach: distance in units of their size
    */
   frame(boxes, { reach = 1.1, ...looks }) {
     const corners = boxes.flatMap((box) => box || []);
@@ -116,7 +111,7 @@ export class SceneView {
 /**
  * The colour behind a canvas.
  * @param {HTMLCanvasElement} canvas
- * @returns {Colour}
+ * @returns {drawing.Colour}
  */
 function groundOf(canvas) {
   const levels = getComputedStyle(canvas).backgroundColor.match(/[\d.]+/g) || [];

@@ -1,20 +1,16 @@
 // @ts-check
 // Points, boxes and places of frames in 3D.
 
-/** @typedef {import('./types').Box} Box */
-/** @typedef {import('./types').Pose} Pose */
-/** @typedef {import('./types').Vector} Vector */
-
 /**
  * A vector from what is said of each axis (0, 1, 2).
  * @param {(axis: number) => number} along
- * @returns {Vector}
+ * @returns {drawing.Vector}
  */
 export function vector(along) { return [along(0), along(1), along(2)]; }
 
 /**
  * A point of one frame in another.
- * @param {Pose} pose
+ * @param {drawing.Pose} pose
  * @param {ArrayLike<number>} point
  */
 export function placed(pose, point) {
@@ -27,8 +23,8 @@ export function placed(pose, point) {
 
 /**
  * One pose after the other.
- * @param {Pose} one
- * @param {Pose} other
+ * @param {drawing.Pose} one
+ * @param {drawing.Pose} other
  */
 export function chained(one, other) {
   const found = new Float32Array(12);
@@ -44,11 +40,11 @@ export function chained(one, other) {
 
 /**
  * The eight corners of a box.
- * @param {Box} box
- * @returns {Vector[]}
+ * @param {drawing.Box} box
+ * @returns {drawing.Vector[]}
  */
 export function cornersOf(box) {
-  /** @type {Vector[]} */
+  /** @type {drawing.Vector[]} */
   const found = [];
   for (const [x] of box) for (const [, y] of box) for (const [, , z] of box) found.push([x, y, z]);
   return found;
@@ -56,20 +52,20 @@ export function cornersOf(box) {
 
 /**
  * The box around some points; of none it is empty (low is infinite).
- * @param {Vector[]} points
- * @returns {Box}
+ * @param {drawing.Vector[]} points
+ * @returns {drawing.Box}
  */
 export function boxAround(points) {
   return [vector((axis) => Math.min(...points.map((point) => point[axis]))),
     vector((axis) => Math.max(...points.map((point) => point[axis])))];
 }
 
-/** @param {Box} box */
+/** @param {drawing.Box} box */
 export function middleOf([low, high]) { return vector((axis) => (low[axis] + high[axis]) / 2); }
 
 /**
  * The length of a box's diagonal.
- * @param {Box} box
+ * @param {drawing.Box} box
  */
 export function diagonalOf([low, high]) {
   return Math.hypot(...vector((axis) => high[axis] - low[axis]));

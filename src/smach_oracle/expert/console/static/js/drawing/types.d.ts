@@ -1,6 +1,8 @@
 // Shapes of what is drawn in 3D. Lengths are metres unless px is written beside them.
 import { Raster } from './raster.js';
 
+export as namespace drawing;
+
 export type Vector = [x: number, y: number, z: number];
 
 /** A frame's place in another: 3 x 4, by rows. */

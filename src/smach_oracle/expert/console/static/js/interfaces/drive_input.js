@@ -9,7 +9,6 @@ import { MOTIONS, MOVE_OF_KEY } from './drive_moves.js';
 import { GamepadInput } from './gamepad.js';
 import { holdByKey } from './held_by_key.js';
 
-/** @typedef {import('../server').DriveWish} DriveWish */
 /** @typedef {import('./drive_moves.js').Move} Move */
 
 export class DriveInput {
@@ -137,7 +136,7 @@ export class DriveInput {
 
   /**
    * What is held now.
-   * @returns {DriveWish}
+   * @returns {server.DriveWish}
    */
   read() {
     const wish = this.readPressed();
@@ -155,10 +154,10 @@ export class DriveInput {
       angular: vector((axis) => bounded(angular[axis])) };
   }
 
-  /** @returns {DriveWish} */
+  /** @returns {server.DriveWish} */
   readPressed() {
     const { moves } = this;
-    /** @type {DriveWish} */
+    /** @type {server.DriveWish} */
     const wish = { held: false, linear: [0, 0, 0], angular: [0, 0, 0], gripper: '' };
     for (const { move, kind, axis, sign } of MOTIONS) if (moves.has(move)) wish[kind][axis] += sign;
     for (const move of moves) if (move === 'open' || move === 'close') wish.gripper = move;

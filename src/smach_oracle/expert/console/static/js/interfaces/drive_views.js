@@ -10,8 +10,6 @@ import { CameraView } from '../sensors/camera_view.js';
 import { robotOf } from '../sensors/robot_feed.js';
 import { RobotView } from '../sensors/robot_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Sensor} Sensor */
 /** @typedef {{ root: HTMLElement, stop(): void }} View */
 
 const WIDTH = 640; // px
@@ -24,15 +22,15 @@ const IN_3D = 'Robot in 3D';
 
 export class DriveViews {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} robot
    */
   constructor(app, robot) {
     this.app = app;
     this.robot = robot;
-    /** @type {Sensor[]} */
+    /** @type {server.Sensor[]} */
     this.own = [];
-    /** @type {Sensor[]} */
+    /** @type {server.Sensor[]} */
     this.others = []; // cameras that are not known as its own
     this.chosen = remembered(PREFERENCE, '').split('\n').filter(Boolean); // topics
     this.key = ''; // of what there is and of what is chosen
@@ -53,7 +51,7 @@ export class DriveViews {
     const ownTopics = this.app.store.get('cameras')?.[this.robot] || [];
     const model = robotOf(this.app, this.robot + '/');
     const cameras = sensors.filter((each) => each.kind === 'image');
-    /** @param {Sensor} sensor */
+    /** @param {server.Sensor} sensor */
     const isOwn = ({ topic }) => ownTopics.includes(topic);
     this.own = [
       ...cameras.filter(isOwn).sort((one, other) => (
@@ -100,7 +98,7 @@ export class DriveViews {
   }
 
   /**
-   * @param {Sensor} sensor
+   * @param {server.Sensor} sensor
    * @param {boolean} isLookedAt
    */
   button({ kind, topic }, isLookedAt) {
@@ -109,7 +107,7 @@ export class DriveViews {
     kind === 'robot' ? IN_3D : breakable(topic.replace(/^\//, ''), '/'));
   }
 
-  /** @param {Sensor[]} looked */
+  /** @param {server.Sensor[]} looked */
   open(looked) {
     for (const [topic, view] of this.views) {
       if (looked.some((each) => each.topic === topic)) continue;

@@ -4,14 +4,10 @@ import { successOf } from '../answering/outcome_choices.js';
 import { NoReply, unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Commands} Commands */
-/** @typedef {import('../server').Question} Question */
-
 const UNKNOWN = 'No reply came: whether it was carried out is not known.';
 const LOST = 'The connection was lost before the robot had confirmed; try again.';
 
-/** @param {Question} question */
+/** @param {server.Question} question */
 export function outcomeChoice({ supersede }) {
   const done = successOf(supersede);
   return h('select', { 'aria-label': 'Outcome' }, supersede.map((choice) => (
@@ -27,11 +23,11 @@ export function outcomeRow(choice) {
 
 /**
  * The reply to a command; null where the connection was lost, which `problem` says then.
- * @template {keyof Commands} Name
- * @param {App} app
+ * @template {keyof server.Commands} Name
+ * @param {page.App} app
  * @param {Element} problem
  * @param {Name} command
- * @param {Commands[Name]} args
+ * @param {server.Commands[Name]} args
  */
 export async function replyTo(app, problem, command, args) {
   try {

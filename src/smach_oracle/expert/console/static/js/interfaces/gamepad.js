@@ -1,8 +1,6 @@
 // @ts-check
 // A gamepad: it moves a hand while a shoulder button is held, its dead-man.
 
-/** @typedef {import('../server').DriveWish} DriveWish */
-
 const DEAD_ZONE = 0.12;
 const HOLD_BUTTONS = [4, 5]; // the shoulder buttons
 const NO_LAYOUT = ' has a layout that this browser does not know: it moves nothing.';
@@ -22,7 +20,7 @@ export class GamepadInput {
 
   /**
    * Add what it says, where it is held.
-   * @param {DriveWish} wish
+   * @param {server.DriveWish} wish
    * @param {boolean} active whether it may hold
    */
   read(wish, active) {
@@ -31,7 +29,7 @@ export class GamepadInput {
 
   /**
    * Of the first gamepad whose layout is known; whether it is held.
-   * @param {DriveWish} wish
+   * @param {server.DriveWish} wish
    */
   readFirst(wish) {
     const all = navigator.getGamepads ? navigator.getGamepads() : [];
@@ -52,7 +50,7 @@ export class GamepadInput {
 
 /**
  * @param {Gamepad} pad
- * @param {DriveWish} wish
+ * @param {server.DriveWish} wish
  */
 function addPad(pad, wish) {
   /** @param {number} index */

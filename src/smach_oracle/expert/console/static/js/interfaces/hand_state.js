@@ -3,15 +3,12 @@
 
 import { percent } from '../page/format.js';
 
-/** @typedef {import('../server').HandState} HandState */
-/** @typedef {import('../server').Manipulation} Manipulation */
-
 const SLOWED = 0.995; // of what is asked: what is above it is called 100 %
 
 /**
  * Whether it moves, and what is in its way; `kind`: good, warn or bad; `share`: how much of the
  * asked speed is left, 0 to 1.
- * @param {HandState | undefined} state
+ * @param {server.HandState | undefined} state
  */
 export function lightOf(state) {
   if (!state) return { text: 'Nothing is heard of the hand yet.', kind: '', share: 0 };
@@ -24,8 +21,8 @@ export function lightOf(state) {
 }
 
 /**
- * @param {Manipulation} manipulation
- * @param {HandState} state
+ * @param {server.Manipulation} manipulation
+ * @param {server.HandState} state
  * @returns {[name: string, value: string][]}
  */
 export function factsOf({ boxes, arms }, state) {
@@ -39,14 +36,14 @@ export function factsOf({ boxes, arms }, state) {
       'xyz'[axis] + ' ' + (value === null ? '–' : value.toFixed(3)))).join('  ')]];
 }
 
-/** @param {HandState} state */
+/** @param {server.HandState} state */
 function speedOf({ speed, moving, share }) {
   const now = speed === null ? '–' : Math.round(1000 * speed) + ' mm/s';
   const asked = moving && share !== null;
   return now + (asked ? ', ' + percent(share) + ' of what is asked' : '');
 }
 
-/** @param {HandState} state */
+/** @param {server.HandState} state */
 function gripperOf({ gripper, stalled }) {
   if (gripper === null) return 'not moved yet';
   return (1000 * gripper).toFixed(0) + ' mm' + (stalled ? ', holds something' : '');

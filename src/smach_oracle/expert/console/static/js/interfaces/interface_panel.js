@@ -6,12 +6,7 @@ import { h, replace, setText } from '../page/dom.js';
 import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
 import { ManipulationPanel } from './manipulation_panel.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Commands} Commands */
-/** @typedef {import('../server').InterfaceOutput} InterfaceOutput */
-/** @typedef {import('../server').Question} Question */
-
-/** @type {{ [status in InterfaceOutput['status']]: string }} */
+/** @type {{ [status in server.InterfaceOutput['status']]: string }} */
 const STATUS = { starting: 'is being started…', running: 'was started for this question',
   failed: 'could not be used', stopped: 'is being stopped', '': '' };
 const RECORD = 'For the record';
@@ -19,8 +14,8 @@ const AT_THE_END = 30; // px from it
 
 export class InterfacePanel {
   /**
-   * @param {App} app
-   * @param {Question} question
+   * @param {page.App} app
+   * @param {server.Question} question
    * @param {string} name of the interface
    * @param {() => void} onEnd the person has finished, or given up
    */
@@ -80,7 +75,7 @@ export class InterfacePanel {
     this.showOutput(store.get('interface_output')?.[key]);
   }
 
-  /** @param {InterfaceOutput | undefined} output */
+  /** @param {server.InterfaceOutput | undefined} output */
   showOutput(output) {
     this.output.hidden = !output;
     if (!output) return;
@@ -109,7 +104,7 @@ export class InterfacePanel {
   /**
    * @template {'hand_over' | 'give_up_interface'} Name
    * @param {Name} command
-   * @param {Commands[Name]} args
+   * @param {server.Commands[Name]} args
    */
   async settle(command, args) {
     if (this.busy) return;

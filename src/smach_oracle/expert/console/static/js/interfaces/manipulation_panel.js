@@ -12,11 +12,6 @@ import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
 import { DriveViews } from './drive_views.js';
 import { factsOf, lightOf } from './hand_state.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').DriveFrame} DriveFrame */
-/** @typedef {import('../server').DriveWish} DriveWish */
-/** @typedef {import('../server').Manipulation} Manipulation */
-/** @typedef {import('../server').Question} Question */
 /** @typedef {import('./drive_moves.js').Move} Move */
 /** @typedef {import('./drive_moves.js').MoveKind} MoveKind */
 
@@ -28,9 +23,9 @@ const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
 const HOLD = 'Hold to move, let go to stop: with mouse or finger, with Enter or Space, or with the '
   + 'key that stands there. ';
 const PAD = 'A gamepad moves while a shoulder button is held.';
-/** @type {DriveWish} */
+/** @type {server.DriveWish} */
 const NOTHING = { held: false, linear: [0, 0, 0], angular: [0, 0, 0], gripper: '' };
-/** @type {Manipulation} */
+/** @type {server.Manipulation} */
 const UNKNOWN = { frames: [], arms: [], boxes: null, wheel: null, driver: '' };
 
 /** @param {string} name */
@@ -40,8 +35,8 @@ function frameOf(name) {
 
 export class ManipulationPanel {
   /**
-   * @param {App} app
-   * @param {Question} question
+   * @param {page.App} app
+   * @param {server.Question} question
    */
   constructor(app, question) {
     this.app = app;
@@ -112,7 +107,7 @@ export class ManipulationPanel {
       MOTIONS.filter((motion) => motion.kind === kind).map(({ move }) => this.pads.get(move)));
   }
 
-  /** @param {DriveFrame} name */
+  /** @param {server.DriveFrame} name */
   frameButton(name) {
     return h('button', { class: 'tool', 'data-frame': name,
       onclick: () => { remember('drive frame', name); this.frame = this.choose(name); } },
@@ -177,8 +172,8 @@ export class ManipulationPanel {
   }
 
   /**
-   * @param {DriveFrame} frame along whose axes the hand moves
-   * @returns {DriveFrame}
+   * @param {server.DriveFrame} frame along whose axes the hand moves
+   * @returns {server.DriveFrame}
    */
   choose(frame) {
     this.input.releaseAll();
@@ -197,7 +192,7 @@ export class ManipulationPanel {
 
   /**
    * Where the interface offers several: the one that moves, and the others to change to.
-   * @param {Manipulation} manipulation
+   * @param {server.Manipulation} manipulation
    */
   showArms({ arms, state }) {
     if (this.arm && !arms.includes(this.arm)) this.arm = '';
@@ -237,7 +232,7 @@ export class ManipulationPanel {
       angular: vector((axis) => wish.angular[axis] * share), gripper: wish.gripper });
   }
 
-  /** @param {DriveWish} wish */
+  /** @param {server.DriveWish} wish */
   send(wish) {
     this.sentMs = performance.now();
     const { frame, arm, sentMs: sent } = this;
@@ -245,7 +240,7 @@ export class ManipulationPanel {
     this.app.connection.send('drive', { question, frame, arm, sent, ...wish }, wish.held);
   }
 
-  /** @param {DriveWish} wish */
+  /** @param {server.DriveWish} wish */
   showHeld({ held }) {
     const { gamepad, moves } = this.input;
     setText(this.hint, HOLD + (gamepad.words || ('getGamepads' in navigator ? PAD : '')));
@@ -262,7 +257,7 @@ export class ManipulationPanel {
     this.showWheel(now);
     this.root.classList.toggle('mine', mine);
     for (const button of this.pads.values()) button.disabled = !mine;
-    for (const name of /** @type {DriveFrame[]} */ (Object.keys(this.frames))) {
+    for (const name of /** @type {server.DriveFrame[]} */ (Object.keys(this.frames))) {
       this.frames[name].hidden = !frames.includes(name);
     }
     if (frames.length && !frames.includes(this.frame)) {
@@ -278,7 +273,7 @@ export class ManipulationPanel {
     this.views.update();
   }
 
-  /** @param {Manipulation | undefined} now */
+  /** @param {server.Manipulation | undefined} now */
   showWheel(now) {
     const { connected } = this.app.connection;
     const may = this.app.role === 'teleoperator';

@@ -2,10 +2,8 @@
 // What a perception interface has made out, in numbers.
 import { h } from '../page/dom.js';
 
-/** @typedef {import('../server').MarkedObject} MarkedObject */
-
 /**
- * @param {MarkedObject} object
+ * @param {server.MarkedObject} object
  * @param {number} elapsed s
  */
 export function markedFacts({ size, position, yaw, frame, points }, elapsed) {

@@ -1,12 +1,10 @@
 // @ts-check
 // What is drawn on an image: a region, and strokes that say what belongs to the object. Pure.
 
-/** @typedef {import('../server').Point} Point */
-/** @typedef {import('../server').Stroke} Stroke */
 /** @typedef {'rectangle' | 'free'} RegionTool */
 /** @typedef {'object' | 'background'} Brush */
 /** @typedef {RegionTool | Brush} Tool */
-/** @typedef {{ tool: Tool, width: number, points: Point[] }} Line width in px */
+/** @typedef {{ tool: Tool, width: number, points: server.Point[] }} Line width in px */
 
 const LEAST_SIDE = 6; // px: less is a slip of the hand
 const SPACING = 2; // px between the corners of a free line
@@ -21,9 +19,9 @@ export function isBrush(tool) { return tool === 'object' || tool === 'background
 
 export class Marking {
   constructor() {
-    /** @type {Point[] | null} */
+    /** @type {server.Point[] | null} */
     this.region = null;
-    /** @type {Stroke[]} */
+    /** @type {server.Stroke[]} */
     this.strokes = [];
     /** @type {Line | null} */
     this.line = null; // that is being drawn
@@ -37,14 +35,14 @@ export class Marking {
 
   /**
    * @param {Tool} tool
-   * @param {Point} point
+   * @param {server.Point} point
    * @param {number} width px
    */
   begin(tool, point, width) {
     this.line = { tool, width, points: [point] };
   }
 
-  /** @param {Point} point */
+  /** @param {server.Point} point */
   move(point) {
     if (!this.line) return;
     const { tool, points } = this.line;
@@ -91,7 +89,7 @@ export class Marking {
 
 /**
  * @param {Line} line
- * @returns {Stroke}
+ * @returns {server.Stroke}
  */
 function strokeOf({ tool, width, points }) {
   return { foreground: tool === 'object', width, points };
@@ -99,7 +97,7 @@ function strokeOf({ tool, width, points }) {
 
 /**
  * @param {Line} line
- * @returns {Point[]}
+ * @returns {server.Point[]}
  */
 function cornersOf({ tool, points }) {
   if (tool !== 'rectangle') return points;
@@ -107,7 +105,7 @@ function cornersOf({ tool, points }) {
   return [first, [last[0], first[1]], last, [first[0], last[1]]];
 }
 
-/** @param {Point[]} corners */
+/** @param {server.Point[]} corners */
 function isSlip(corners) {
   const [width, height] = [0, 1].map((axis) => {
     const places = corners.map((corner) => corner[axis]);

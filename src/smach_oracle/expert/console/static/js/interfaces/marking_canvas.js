@@ -5,7 +5,6 @@ import { Marking, isBrush } from './marking.js';
 import { drawCross, drawMarking } from './marking_drawing.js';
 import { MARKING_KEYS, MarkingKeys } from './marking_keys.js';
 
-/** @typedef {import('../server').Point} Point */
 /** @typedef {import('./marking.js').Tool} Tool */
 /**
  * @typedef {object} Use
@@ -67,7 +66,7 @@ export class MarkingCanvas {
     this.beginAt(this.at(event));
   }
 
-  /** @param {Point} point */
+  /** @param {server.Point} point */
   beginAt(point) {
     const correcting = isBrush(this.tool);
     if (correcting && !this.marking.region) {
@@ -104,7 +103,7 @@ export class MarkingCanvas {
   /**
    * The pixel of the image.
    * @param {PointerEvent} event
-   * @returns {Point}
+   * @returns {server.Point}
    */
   at(event) {
     const { left, top, width, height } = this.root.getBoundingClientRect();

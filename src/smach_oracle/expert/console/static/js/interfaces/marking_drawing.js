@@ -1,8 +1,6 @@
 // @ts-check
 // Draws on a canvas what is marked on an image, and what was cut out.
 
-/** @typedef {import('../server').Point} Point */
-/** @typedef {import('../server').Stroke} Stroke */
 /** @typedef {import('./marking.js').Marking} Marking */
 
 const ARM = 14; // px of the screen, of the cross
@@ -26,7 +24,7 @@ export function drawMarking(context, marking, outlines, scale) {
 
 /**
  * @param {CanvasRenderingContext2D} context
- * @param {Point[]} points
+ * @param {server.Point[]} points
  * @param {boolean} open
  */
 function trace(context, points, open) {
@@ -37,7 +35,7 @@ function trace(context, points, open) {
 
 /**
  * @param {CanvasRenderingContext2D} context
- * @param {Point[]} points
+ * @param {server.Point[]} points
  * @param {number} scale
  * @param {boolean} open
  */
@@ -55,7 +53,7 @@ function drawOutline(context, points, scale, open) {
 
 /**
  * @param {CanvasRenderingContext2D} context
- * @param {Stroke} stroke
+ * @param {server.Stroke} stroke
  */
 function drawStroke(context, { foreground, width, points }) {
   trace(context, points, true);
@@ -68,7 +66,7 @@ function drawStroke(context, { foreground, width, points }) {
 /**
  * Where the keyboard draws.
  * @param {CanvasRenderingContext2D} context
- * @param {Point} point
+ * @param {server.Point} point
  * @param {number} scale px of the image for one of the screen
  */
 export function drawCross(context, [x, y], scale) {

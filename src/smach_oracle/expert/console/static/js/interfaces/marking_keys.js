@@ -4,15 +4,14 @@
 import { announce } from '../page/announce.js';
 import { modified } from '../page/dom.js';
 
-/** @typedef {import('../server').Point} Point */
 /**
  * @typedef {object} Use
- * @property {() => Point} size of the image, px
+ * @property {() => server.Point} size of the image, px
  * @property {() => number} scale px of the image for one of the screen
  * @property {() => boolean} may whether somebody may draw now
  * @property {() => boolean} drawing whether a line has begun
- * @property {(point: Point) => void} begin
- * @property {(point: Point) => void} move
+ * @property {(point: server.Point) => void} begin
+ * @property {(point: server.Point) => void} move
  * @property {() => void} end
  * @property {() => void} cancel
  * @property {() => void} moved the cross has moved, come or gone
@@ -22,7 +21,7 @@ export const MARKING_KEYS = 'Arrow keys move the cross (with Shift by one pixel)
   + 'ends what is drawn, Escape takes the line back.';
 const STEP = 10; // px of the screen
 const QUIET_MS = 400; // without a key: then the cross's place is said
-/** @type {{ [key: string]: Point | undefined }} */
+/** @type {{ [key: string]: server.Point | undefined }} */
 const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export class MarkingKeys {
@@ -32,7 +31,7 @@ export class MarkingKeys {
    */
   constructor(canvas, use) {
     this.use = use;
-    /** @type {Point | null} */
+    /** @type {server.Point | null} */
     this.cross = null; // null: it is not shown
     this.timer = 0;
     canvas.addEventListener('keydown', (event) => this.key(event));
@@ -57,11 +56,11 @@ export class MarkingKeys {
   get place() {
     const [width, height] = this.use.size();
     const [x, y] = this.cross || [width / 2, height / 2];
-    return /** @type {Point} */ ([within(x, width), within(y, height)]);
+    return /** @type {server.Point} */ ([within(x, width), within(y, height)]);
   }
 
   /**
-   * @param {Point} step
+   * @param {server.Point} step
    * @param {boolean} finely
    */
   step([dx, dy], finely) {

@@ -10,13 +10,6 @@ import { h } from '../page/dom.js';
 import { RobotFeed, robotOf } from '../sensors/robot_feed.js';
 import { SensorFeed } from '../sensors/sensor_feed.js';
 
-/** @typedef {import('../drawing/types').Points} Points */
-/** @typedef {import('../drawing/types').Vector} Vector */
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').CloudFacts} CloudFacts */
-/** @typedef {import('../server').MarkedObject} MarkedObject */
-/** @typedef {import('../server').PerceptionSensors} PerceptionSensors */
-
 const DIM = 0.62; // what is around the object
 const ROBOT_DIM = 0.35;
 const SPACING = 0.007; // m between its points
@@ -26,17 +19,17 @@ const NEAREST = 0.5; // m from which it is looked at
 
 export class ObjectView {
   /**
-   * @param {App} app
-   * @param {() => PerceptionSensors} numbers of the interface's sensors
+   * @param {page.App} app
+   * @param {() => server.PerceptionSensors} numbers of the interface's sensors
    */
   constructor(app, numbers) {
     this.app = app;
     this.numbers = numbers;
-    /** @type {MarkedObject | null} */
+    /** @type {server.MarkedObject | null} */
     this.found = null;
-    /** @type {Points | null} */
+    /** @type {drawing.Points | null} */
     this.own = null; // points of the object
-    /** @type {Vector | null} */
+    /** @type {drawing.Vector | null} */
     this.lastPosition = null;
     /** @type {CloudLayer | null} */
     this.around = null;
@@ -53,7 +46,7 @@ export class ObjectView {
       onclick: () => this.toggleRobot() }, 'Robot');
     this.scene.buttons.append(this.robotToggle);
     this.root = h('div', { class: 'object-view', hidden: true }, this.scene.root);
-    /** @type {SensorFeed<CloudFacts>} */
+    /** @type {SensorFeed<server.CloudFacts>} */
     this.feed = new SensorFeed(app, () => (this.found ? numbers().cloud : null), this.root, {
       every: PERIOD_MS,
       beside: () => (this.robot ? this.robot.number : undefined),
@@ -68,7 +61,7 @@ export class ObjectView {
     if (this.robot) this.robot.stop();
   }
 
-  /** @param {MarkedObject | null} found null where nothing is */
+  /** @param {server.MarkedObject | null} found null where nothing is */
   show(found) {
     const far = !found || !this.lastPosition || distance(found.position, this.lastPosition) > NEAR;
     this.found = found;
@@ -101,7 +94,7 @@ export class ObjectView {
 
   /**
    * @param {Response} answer
-   * @param {CloudFacts} facts
+   * @param {server.CloudFacts} facts
    */
   async takeCloud(answer, facts) {
     const moved = JSON.stringify(facts.place) !== JSON.stringify(this.place);
@@ -117,8 +110,8 @@ export class ObjectView {
   }
 
   /**
-   * @param {MarkedObject} found
-   * @param {Points} own
+   * @param {server.MarkedObject} found
+   * @param {drawing.Points} own
    */
   build(found, { points, colours }) {
     const copy = { points: points.slice(), colours };
@@ -146,8 +139,8 @@ export class ObjectView {
 }
 
 /**
- * @param {Vector} one
- * @param {Vector} other
+ * @param {drawing.Vector} one
+ * @param {drawing.Vector} other
  */
 function distance(one, other) {
   return Math.hypot(one[0] - other[0], one[1] - other[1], one[2] - other[2]);

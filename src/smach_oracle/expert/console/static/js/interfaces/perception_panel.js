@@ -9,12 +9,6 @@ import { markedFacts } from './marked_facts.js';
 import { MarkingCanvas } from './marking_canvas.js';
 import { ObjectView } from './object_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Commands} Commands */
-/** @typedef {import('../server').ImageFacts} ImageFacts */
-/** @typedef {import('../server').Marked} Marked */
-/** @typedef {import('../server').Question} Question */
 /** @typedef {import('./marking.js').Tool} Tool */
 
 /** @type {{ tool: Tool, text: string, title: string }[]} */
@@ -33,8 +27,8 @@ const DRAW = 'Draw around the whole object, closely; the rest is cut out by itse
 
 export class PerceptionPanel {
   /**
-   * @param {App} app
-   * @param {Question} question
+   * @param {page.App} app
+   * @param {server.Question} question
    * @param {() => void} onEnd an object was accepted, or the expert gave up
    */
   constructor(app, question, onEnd) {
@@ -47,7 +41,7 @@ export class PerceptionPanel {
     this.stamp = ''; // of the image
     this.generation = 0; // of what is drawn
     this.askedMs = 0;
-    /** @type {Marked | null} */
+    /** @type {server.Marked | null} */
     this.marked = null;
     this.warning = '';
     this.resultKey = ''; // of what is shown of it
@@ -65,7 +59,7 @@ export class PerceptionPanel {
     this.object = new ObjectView(app, () => this.sensors);
     this.root = this.build();
     this.take('rectangle');
-    /** @type {SensorFeed<ImageFacts>} */
+    /** @type {SensorFeed<server.ImageFacts>} */
     this.feed = new SensorFeed(app, () => this.sensors.image, this.root,
       { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
         say: (text, missing) => this.say(text, missing) });
@@ -105,7 +99,7 @@ export class PerceptionPanel {
         h('div', { class: 'perception-side' }, this.buildSide())));
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   buildSide() {
     const { undo, clear, accept, quit } = this.buttons;
     const several = this.question.supersede.length > 1;
@@ -151,7 +145,7 @@ export class PerceptionPanel {
 
   /**
    * @param {Response} answer
-   * @param {ImageFacts} facts
+   * @param {server.ImageFacts} facts
    */
   async show(answer, { size, stamp }) {
     await drawImage(this.image, answer, size);
@@ -192,7 +186,7 @@ export class PerceptionPanel {
     this.refresh();
   }
 
-  /** @param {import('../server').Reply<'mark'>} reply */
+  /** @param {server.Reply<'mark'>} reply */
   takeIn({ ok, message, data }) {
     this.canvas.outlines = data ? data.outlines : [];
     this.marked = ok && data ? data : null;
@@ -235,7 +229,7 @@ export class PerceptionPanel {
   /**
    * @template {'hand_over' | 'give_up_interface'} Name
    * @param {Name} command
-   * @param {Commands[Name]} args
+   * @param {server.Commands[Name]} args
    */
   async settle(command, args) {
     if (this.busy) return;
@@ -254,9 +248,9 @@ export class PerceptionPanel {
 
   /**
    * null where the connection was lost.
-   * @template {keyof Commands} Name
+   * @template {keyof server.Commands} Name
    * @param {Name} command
-   * @param {Commands[Name]} args
+   * @param {server.Commands[Name]} args
    */
   ask(command, args) { return replyTo(this.app, this.problem, command, args); }
 

@@ -6,7 +6,6 @@ import { h, setText } from './dom.js';
 import { counted } from './format.js';
 import { remember, remembered } from './preferences.js';
 
-/** @typedef {import('../server').Question} Question */
 /** @typedef {'on' | 'off' | 'asks' | 'none'} SoundState `asks`: the browser waits for a press */
 
 const TITLE = 'Operator console';
@@ -21,7 +20,7 @@ const SOUNDS = { on: 'Sound on', off: 'Sound off', asks: 'Allow sound', none: 'N
 
 /**
  * Whether a question waits for somebody: nobody works on it, or its holder presses nothing.
- * @param {Question} question
+ * @param {server.Question} question
  */
 export function waits({ status, idle }) {
   return status === 'pending' || (status === 'claimed' && idle > 0);
@@ -29,7 +28,7 @@ export function waits({ status, idle }) {
 
 /**
  * Why a question calls people now, each reason with what makes it another one.
- * @param {Question} question
+ * @param {server.Question} question
  * @param {number} now by the server's clock
  * @returns {{ kind: 'new' | 'idle' | 'near', id: string }[]}
  */
@@ -77,7 +76,7 @@ export class Alerts {
 
   /**
    * Call for those that nobody works on, whose holder presses nothing, or whose time is short.
-   * @param {Question[]} questions that are open
+   * @param {server.Question[]} questions that are open
    * @param {number} now by the server's clock
    */
   look(questions, now) {
@@ -115,7 +114,7 @@ export class Alerts {
     }
   }
 
-  /** @param {Question} question */
+  /** @param {server.Question} question */
   notify({ state, stands, robot, key }) {
     if (!document.hidden || !CAN_NOTIFY || Notification.permission !== 'granted') return;
     try {
@@ -164,7 +163,7 @@ export class Alerts {
 }
 
 /**
- * @param {Question} question the first of those that call
+ * @param {server.Question} question the first of those that call
  * @param {'new' | 'idle' | 'near'} kind why it does
  * @param {number} count how many call
  * @param {number} waiting how many wait in all

@@ -14,16 +14,11 @@ import { askName, askToken, demandName } from './sign_in.js';
 import { Store } from './store.js';
 
 /** @typedef {import('./connection.js').State} State */
-/** @typedef {import('../server').Commands} Commands */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('./types').App} AppOfPanels */
-/** @typedef {import('./types').Panel} Panel */
-/** @typedef {import('./types').PanelView} PanelView */
 /** @typedef {'auto' | 'light' | 'dark'} Theme */
 /**
  * @typedef {object} Tab
  * @property {string} id
- * @property {PanelView} view
+ * @property {page.PanelView} view
  * @property {HTMLButtonElement} button
  * @property {HTMLElement} badge
  */
@@ -32,7 +27,7 @@ import { Store } from './store.js';
 const STATES = { connecting: 'connecting…', connected: 'live', 'signed-out': 'signed out',
   lost: 'connection lost – trying again' };
 const RECONNECT_AFTER_S = 22; // of silence: the connection may lead nowhere
-/** @type {Set<keyof Commands>} */
+/** @type {Set<keyof server.Commands>} */
 const UNTOLD = new Set(['hello', 'watch', 'look', 'view', 'pressed', 'release', 'drive']);
 /** @type {{ [theme in Theme]: { words: string, dark: string, next: Theme } }} dark: its media */
 const THEMES = {
@@ -41,9 +36,9 @@ const THEMES = {
   dark: { words: '● Dark', dark: 'all', next: 'auto' },
 };
 
-/** @implements {AppOfPanels} */
+/** @implements {page.App} */
 export class App {
-  /** @param {Panel[]} panels the first one is shown at first */
+  /** @param {page.Panel[]} panels the first one is shown at first */
   constructor(panels) {
     this.store = new Store();
     this.liveness = new Liveness(this.store);
@@ -83,7 +78,7 @@ export class App {
 
   get mayAnswer() { return this.role === 'operator' || this.role === 'teleoperator'; }
 
-  /** @param {Question} question */
+  /** @param {server.Question} question */
   isMine({ holder, session }) {
     return Boolean(holder) && holder === this.expert && session === this.connection.browser;
   }
@@ -98,7 +93,7 @@ export class App {
   }
 
   /**
-   * @param {Panel} panel
+   * @param {page.Panel} panel
    * @returns {Tab}
    */
   tab({ id, title, create }) {
@@ -179,7 +174,7 @@ export class App {
   }
 
   /**
-   * @param {keyof Commands} command
+   * @param {keyof server.Commands} command
    * @param {number} limit s
    */
   sayNoReply(command, limit) {

@@ -1,15 +1,11 @@
 // @ts-check
 // The connection to the server: it comes back by itself.
 
-/** @typedef {import('../server').Batch} Batch */
-/** @typedef {import('../server').Commands} Commands */
-/** @typedef {import('../server').Reply} Reply */
-/** @typedef {import('../server').Session} Session */
 /** @typedef {import('./store.js').Store} Store */
 /** @typedef {'connecting' | 'signed-out' | 'connected' | 'lost'} State */
 /**
  * @typedef {object} Waiting
- * @property {(reply: Reply) => void} resolve
+ * @property {(reply: server.Reply) => void} resolve
  * @property {(err: Error) => void} reject
  * @property {number} timer for that no reply comes
  */
@@ -39,7 +35,8 @@ export class Connection {
    * @param {Store} store
    * @param {(state: State) => void} onState
    * @param {() => void} onEnd the person has signed out on another page of this browser
-   * @param {(name: keyof Commands, limit: number) => void} onNoReply to a command within so many s
+   * @param {(name: keyof server.Commands, limit: number) => void} onNoReply to a command within
+   *   so many s
    */
   constructor(store, onState, onEnd, onNoReply) {
     this.store = store;
@@ -54,7 +51,7 @@ export class Connection {
     this.pause = SHORTEST_PAUSE_S;
     this.timer = 0;
     this.generation = 0;
-    /** @type {Session | null} */
+    /** @type {server.Session | null} */
     this.session = null;
     /** @type {WebSocket | null} */
     this.socket = null;
@@ -98,7 +95,7 @@ export class Connection {
     else this.open(generation, this.session);
   }
 
-  /** @returns {Promise<Session>} */
+  /** @returns {Promise<server.Session>} */
   async whoAmI() {
     const limit = new AbortController();
     const timer = setTimeout(() => limit.abort(), SESSION_LIMIT_MS);
@@ -110,7 +107,7 @@ export class Connection {
 
   /**
    * @param {number} generation
-   * @param {Session} session
+   * @param {server.Session} session
    */
   open(generation, session) {
     const address = new URL('socket', location.href);
@@ -128,7 +125,7 @@ export class Connection {
 
   /**
    * @param {number} generation
-   * @param {Session} session
+   * @param {server.Session} session
    */
   async sayHello(generation, { xsrf }) {
     try {
@@ -180,7 +177,7 @@ export class Connection {
     return waiting;
   }
 
-  /** @param {Batch | Reply} message */
+  /** @param {server.Batch | server.Reply} message */
   receive(message) {
     if (!('re' in message)) {
       this.store.receive(message);
@@ -191,23 +188,23 @@ export class Connection {
 
   /**
    * One command; rejects with ConnectionLost where the connection goes before the reply is there.
-   * @template {keyof Commands} Name
+   * @template {keyof server.Commands} Name
    * @param {Name} name
-   * @param {Commands[Name]} args
-   * @returns {Promise<import('../server').Reply<Name>>}
+   * @param {server.Commands[Name]} args
+   * @returns {Promise<server.Reply<Name>>}
    */
   request(name, args) {
     const first = this.gate?.before(name, /** @type {{ question?: string }} */ (args));
     if (!first) return this.post(name, args);
     return first.then((refusal) => (
-      /** @type {import('../server').Reply<Name> | null} */ (refusal) || this.post(name, args)));
+      /** @type {server.Reply<Name> | null} */ (refusal) || this.post(name, args)));
   }
 
   /**
-   * @template {keyof Commands} Name
+   * @template {keyof server.Commands} Name
    * @param {Name} name
-   * @param {Commands[Name]} args
-   * @returns {Promise<import('../server').Reply<Name>>}
+   * @param {server.Commands[Name]} args
+   * @returns {Promise<server.Reply<Name>>}
    */
   post(name, args) {
     const socket = this.openSocket;
@@ -220,16 +217,16 @@ export class Connection {
         reject(new NoReply('no reply within ' + REQUEST_LIMIT_S + ' s'));
       }, REQUEST_LIMIT_S * 1000);
       this.waiting.set(number, { reject, timer,
-        resolve: /** @type {(reply: Reply) => void} */ (resolve) });
+        resolve: /** @type {(reply: server.Reply) => void} */ (resolve) });
       socket.send(JSON.stringify({ id: number, do: name, ...args, ...this.gate?.beside(name) }));
     });
   }
 
   /**
    * A command whose reply nobody waits for.
-   * @template {keyof Commands} Name
+   * @template {keyof server.Commands} Name
    * @param {Name} name
-   * @param {Commands[Name]} args
+   * @param {server.Commands[Name]} args
    * @param {boolean} unlessLate not where earlier ones are still on their way out
    */
   send(name, args, unlessLate) {

@@ -1,9 +1,6 @@
 // @ts-check
 // Elements made of plain text: whatever a robot says is a text node, never markup.
 
-/** @typedef {import('./types').Child} Child */
-/** @typedef {import('./types').Properties} Properties */
-
 const SVG = 'http://www.w3.org/2000/svg';
 const TOAST_MS = 6000;
 // what steers a terminal, turns the reading direction, or cannot be seen
@@ -26,8 +23,8 @@ export function keyOf(node) { return keys.get(node) || ''; }
 /**
  * @template {HTMLElement | SVGElement} Made
  * @param {Made} element
- * @param {Properties} properties
- * @param {Child[]} children
+ * @param {page.Properties} properties
+ * @param {page.Child[]} children
  */
 function fill(element, properties, children) {
   for (const [name, value] of Object.entries(properties)) {
@@ -55,7 +52,7 @@ function setAttribute(element, name, value) {
 }
 
 /**
- * @param {Child[]} children
+ * @param {page.Child[]} children
  * @returns {Node[]}
  */
 export function nodesOf(children) {
@@ -70,8 +67,8 @@ export function nodesOf(children) {
  * An element: h('button', {class: 'x', onclick: f, '--hue': 3}, 'text', other elements).
  * @template {keyof HTMLElementTagNameMap} Tag
  * @param {Tag} tag
- * @param {Properties} properties
- * @param {...Child} children
+ * @param {page.Properties} properties
+ * @param {...page.Child} children
  * @returns {HTMLElementTagNameMap[Tag]}
  */
 export function h(tag, properties, ...children) {
@@ -82,8 +79,8 @@ export function h(tag, properties, ...children) {
  * An element of a drawing.
  * @template {keyof SVGElementTagNameMap} Tag
  * @param {Tag} tag
- * @param {Properties} properties
- * @param {...Child} children
+ * @param {page.Properties} properties
+ * @param {...page.Child} children
  * @returns {SVGElementTagNameMap[Tag]}
  */
 export function svg(tag, properties, ...children) {
@@ -92,7 +89,7 @@ export function svg(tag, properties, ...children) {
 
 /**
  * @param {Element} element
- * @param {...Child} children
+ * @param {...page.Child} children
  */
 export function replace(element, ...children) {
   element.replaceChildren(...nodesOf(children));

@@ -2,10 +2,7 @@
 // Numbers and names as people read them.
 import { h } from './dom.js';
 
-/** @typedef {import('../server').FailureClass} FailureClass */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-
-/** @type {{ [rank in FailureClass]: string }} */
+/** @type {{ [rank in server.FailureClass]: string }} */
 export const FAILURE_CLASSES = { 0: '', 1: 'low', 2: 'moderate', 3: 'high' };
 
 const GOLDEN = 137.5; // degrees: neighbours on a list are far apart on the circle of colours
@@ -68,7 +65,7 @@ export function breakable(name, sign) {
 
 /**
  * What the text of an event adds to its words.
- * @param {Pick<TrialEvent, 'text' | 'words'>} event
+ * @param {Pick<server.TrialEvent, 'text' | 'words'>} event
  */
 export function added(event) {
   return event.text && !event.words.includes(event.text) ? ' ' + event.text : '';

@@ -2,10 +2,8 @@
 // What is asked before a command is sent: whether an answer still fits what is heard, and who gives
 // it. What stops or lets go passes at once.
 
-/** @typedef {import('../server').Commands} Commands */
-/** @typedef {import('../server').Reply} Reply */
 /** @typedef {import('./liveness.js').Liveness} Liveness */
-/** @typedef {keyof Commands} Name */
+/** @typedef {keyof server.Commands} Name */
 
 /** @type {Set<Name>} */
 const ANSWERING = new Set(['answer', 'hand_over']);
@@ -34,7 +32,8 @@ export class Gate {
   /**
    * @param {Name} name
    * @param {{ question?: string, robot?: string }} args
-   * @returns {Promise<Reply | null> | null} a refusal that is there already; null: it is sent
+   * @returns {Promise<server.Reply | null> | null} a refusal that is there already; null: it is
+   *   sent
    */
   before(name, { question, robot }) {
     const asked = ANSWERING.has(name)
@@ -58,6 +57,6 @@ export class Gate {
 
 /**
  * @param {string} message
- * @returns {Reply}
+ * @returns {server.Reply}
  */
 function refused(message) { return { re: 0, ok: false, message }; }

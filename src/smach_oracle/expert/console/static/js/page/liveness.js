@@ -3,8 +3,6 @@
 // answer. The console sends a beat every second; the ages that come with it grow until the next.
 import { duration } from './format.js';
 
-/** @typedef {import('../server').Heard} Heard */
-/** @typedef {import('../server').Question} Question */
 /** @typedef {import('./store.js').Store} Store */
 /** @typedef {'' | 'console' | 'master'} Silent */
 
@@ -25,7 +23,7 @@ export class Liveness {
     this.wall = Date.now();
   }
 
-  /** @returns {Heard | undefined} */
+  /** @returns {server.Heard | undefined} */
   get heard() { return this.store.get('heard'); }
 
   /** The newest beat, for what is sent to say what the page has seen. */
@@ -65,7 +63,7 @@ export class Liveness {
 
   /**
    * Who must be heard for a question to be answered, and is not; '' where all are.
-   * @param {Question} question
+   * @param {server.Question} question
    */
   whoIsSilent({ server, robot }) {
     return this.whoOf(robot) || (tooOld(this.server(server)) ? server : '');
@@ -82,7 +80,7 @@ export class Liveness {
 
   /**
    * Why no answer is sent; '' where one may be.
-   * @param {Question} question
+   * @param {server.Question} question
    */
   refusal(question) { return unheard(this.whoIsSilent(question)); }
 
@@ -95,7 +93,7 @@ export class Liveness {
   /**
    * Why a question is gone, where its robot is; '' where that is not known: from a console or a
    * master that is silent nothing is heard of any robot.
-   * @param {Question} question
+   * @param {server.Question} question
    */
   gone({ server, robot }) {
     if (this.silent) return '';

@@ -3,8 +3,6 @@
 // nothing comes or goes meanwhile, so that a click that has begun is not lost, nor lands elsewhere.
 import { keyOf, nodesOf } from './dom.js';
 
-/** @typedef {import('./types').Child} Child */
-
 const CLICK_MS = 100; // by then the click of what was let go has come
 const PRESSED = 'button, summary, [role="button"], .mark, .event';
 /** @type {Map<Element, () => void>} */
@@ -17,7 +15,7 @@ let timer = 0;
  * The element's children are these, in this order. Those that stay are not taken out, not even for
  * a moment: that would cost them focus and scroll position, and the click that has begun on them.
  * @param {Element} element
- * @param {...Child} children
+ * @param {...page.Child} children
  */
 export function arrange(element, ...children) {
   whenLetGo(element, () => put(element, nodesOf(children)));
@@ -28,7 +26,7 @@ export function arrange(element, ...children) {
  * there become like them, each like the one of its kind and `key`. They keep their listeners, which
  * therefore go by the key alone.
  * @param {Element} element
- * @param {...Child} children
+ * @param {...page.Child} children
  */
 export function redraw(element, ...children) {
   whenLetGo(element, () => {

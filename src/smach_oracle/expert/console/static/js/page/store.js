@@ -2,11 +2,6 @@
 // The newest sections that the server has sent; they are kept while the connection is away.
 import { changed as rowsAfter } from './row_lists.js';
 
-/** @typedef {import('../server').Batch} Batch */
-/** @typedef {import('../server').EventSlice} EventSlice */
-/** @typedef {import('../server').Sections} Sections */
-/** @typedef {import('../server').Trial} Trial */
-
 const LISTS = new Set(['trials', 'bags', 'acts']); // of these come changes alone
 
 export class Store {
@@ -15,17 +10,17 @@ export class Store {
     this.sections = new Map();
     /** @type {((names: string[]) => void)[]} */
     this.listeners = [];
-    /** @type {((slice: EventSlice) => void)[]} */
+    /** @type {((slice: server.EventSlice) => void)[]} */
     this.eventListeners = [];
     this.offset = 0; // s, of the server's clock to this one
   }
 
   /**
-   * @template {keyof Sections} Name
+   * @template {keyof server.Sections} Name
    * @param {Name} name
-   * @returns {Sections[Name] | undefined}
+   * @returns {server.Sections[Name] | undefined}
    */
-  get(name) { return /** @type {Sections[Name] | undefined} */ (this.sections.get(name)); }
+  get(name) { return /** @type {server.Sections[Name] | undefined} */ (this.sections.get(name)); }
 
   get questions() { return this.get('questions') || []; }
 
@@ -41,7 +36,7 @@ export class Store {
   onChange(listener) { this.listeners.push(listener); }
 
   /**
-   * @param {(slice: EventSlice) => void} listener
+   * @param {(slice: server.EventSlice) => void} listener
    * @returns {() => void} ends it
    */
   onEvents(listener) {
@@ -51,7 +46,7 @@ export class Store {
     };
   }
 
-  /** @param {Batch} batch */
+  /** @param {server.Batch} batch */
   receive({ now, all, sections = {}, lists = {}, events }) {
     this.offset = now - Date.now() / 1000;
     /** @type {Map<string, unknown>} */
@@ -78,7 +73,7 @@ export class Store {
 
   /**
    * @param {'trials' | 'bags'} name
-   * @param {import('../server').TrialsChange | import('../server').BagsChange} change
+   * @param {server.TrialsChange | server.BagsChange} change
    */
   withTrials(name, change) {
     const old = this.get(name);

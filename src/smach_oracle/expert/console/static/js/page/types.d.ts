@@ -4,6 +4,8 @@ import { Liveness } from './liveness.js';
 import { Store } from './store.js';
 import { Question, Role } from '../server';
 
+export as namespace page;
+
 declare global {
   interface Navigator { // of browsers of 2023 and later
     readonly userActivation?: { readonly hasBeenActive: boolean };

@@ -5,16 +5,7 @@ import { h, setText } from '../page/dom.js';
 import { clock, duration } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../page/types').Panel} Panel */
-/** @typedef {import('../server').Act} Act */
-/** @typedef {import('../server').People} People */
-/** @typedef {import('../server').ShiftNote} ShiftNote */
-/** @typedef {import('../server').ShiftRow} ShiftRow */
-/** @typedef {import('../server').Times} Times */
-
-/** @type {Panel} */
+/** @type {page.Panel} */
 export const people = { id: 'people', title: 'People', create: (app) => new PeoplePanel(app) };
 
 const COLUMNS = ['Who', 'Answered', 'Until claimed', 'Until answered', 'Until it went on'];
@@ -23,7 +14,7 @@ const IN_MEMORY = 'They are kept until this console ends. Its setting ~shift_fil
 const LOST = 'The connection was lost: whether the note is kept is not known.';
 
 class PeoplePanel {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.text = h('textarea', { rows: 3, maxlength: 2000, 'aria-label': 'A note for the next shift',
@@ -78,7 +69,7 @@ class PeoplePanel {
   /**
    * @template {'write_note' | 'drop_note'} Name
    * @param {Name} name
-   * @param {import('../server').Commands[Name]} args
+   * @param {server.Commands[Name]} args
    * @returns {Promise<boolean>} whether it is done
    */
   async send(name, args) {
@@ -95,10 +86,10 @@ class PeoplePanel {
 }
 
 /**
- * @param {People} section
+ * @param {server.People} section
  * @param {boolean} mayDrop
  * @param {(id: string) => void} drop
- * @returns {Child}
+ * @returns {page.Child}
  */
 function notesOf({ notes, kept, problem }, mayDrop, drop) {
   return [problem && h('p', { key: 'problem', class: 'problem' }, problem),
@@ -112,8 +103,8 @@ function notesOf({ notes, kept, problem }, mayDrop, drop) {
 }
 
 /**
- * @param {People} section
- * @returns {Child}
+ * @param {server.People} section
+ * @returns {page.Child}
  */
 function shiftsOf({ shifts, since, kept }) {
   if (!shifts.length) {
@@ -128,19 +119,19 @@ function shiftsOf({ shifts, since, kept }) {
         'Shift from ' + moment(begin))), rows.map(shiftRow)))));
 }
 
-/** @param {ShiftRow} row */
+/** @param {server.ShiftRow} row */
 function shiftRow({ who, answered, claim, answer, resume }) {
   return h('tr', { key: who }, h('th', { scope: 'row' }, who || 'somebody'),
     h('td', { class: 'number' }, answered),
     [claim, answer, resume].map((times) => h('td', { class: 'number' }, timesWords(times))));
 }
 
-/** @param {Times | null} times */
+/** @param {server.Times | null} times */
 function timesWords(times) {
   return times ? duration(times[0]) + ' (' + duration(times[1]) + ')' : '–';
 }
 
-/** @param {Act} act */
+/** @param {server.Act} act */
 function actRow({ id, at, who, role, client, what, robot, ok, message, console: name }) {
   return h('tr', { key: id, title: 'at ' + client + ', by ' + name },
     h('td', { class: 'number' }, moment(at)),

@@ -6,19 +6,16 @@ import { h, setText } from '../page/dom.js';
 import { breakable, counted, duration, percent, robotMark } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Answer} Answer */
-/** @typedef {import('../server').Question} Question */
 /** @typedef {{ ok: boolean, words: string }} Check */
-/** @typedef {{ answer: Answer, words: string, offered: number, advised: number }} Offer */
+/** @typedef {{ answer: server.Answer, words: string, offered: number, advised: number }} Offer */
 
 const PAUSE_MS = 250; // between two questions: two commands each, and ten a second are allowed
 const BY_ITSELF = ' Answer it by itself.';
 
 export class AlikeAnswer {
   /**
-   * @param {App} app
-   * @param {Question[]} questions
+   * @param {page.App} app
+   * @param {server.Question[]} questions
    * @param {() => void} leave
    */
   constructor(app, questions, leave) {
@@ -58,7 +55,7 @@ export class AlikeAnswer {
     this.show();
   }
 
-  /** @returns {Answer | undefined} */
+  /** @returns {server.Answer | undefined} */
   get answer() {
     const offer = this.choice.value && this.offers[Number(this.choice.value)];
     return offer ? { ...offer.answer, why: this.why.value } : undefined;
@@ -73,7 +70,7 @@ export class AlikeAnswer {
 
   /**
    * @param {string} key
-   * @param {Answer} answer
+   * @param {server.Answer} answer
    * @returns {Check}
    */
   check(key, answer) {
@@ -98,8 +95,8 @@ export class AlikeAnswer {
   }
 
   /**
-   * @param {Question} question
-   * @param {Answer | undefined} answer
+   * @param {server.Question} question
+   * @param {server.Answer | undefined} answer
    */
   row({ key, robot, asked }, answer) {
     const result = this.results.get(key);
@@ -139,7 +136,7 @@ export class AlikeAnswer {
 
   /**
    * @param {string} question
-   * @param {Answer} answer
+   * @param {server.Answer} answer
    * @returns {Promise<Check>}
    */
   async sendOne(question, answer) {
@@ -182,7 +179,7 @@ export class AlikeAnswer {
 /**
  * The answers that some of the questions offer: states to go to, and outcomes where nothing is to
  * be entered. Interfaces and giving up are for one question at a time.
- * @param {Question[]} questions
+ * @param {server.Question[]} questions
  * @returns {Offer[]} those that are recommended first, then those that most of them offer
  */
 function offersOf(questions) {
@@ -218,9 +215,9 @@ function offersOf(questions) {
 
 /**
  * Whether a question offers an answer, and what is to be expected of it there.
- * @param {Answer} answer
- * @param {Question} question
- * @param {{ [state: string]: import('../server').PreconditionStatus[] | undefined }} statuses
+ * @param {server.Answer} answer
+ * @param {server.Question} question
+ * @param {{ [state: string]: server.PreconditionStatus[] | undefined }} statuses
  * @returns {Check}
  */
 export function fits({ kind, name, container }, question, statuses) {

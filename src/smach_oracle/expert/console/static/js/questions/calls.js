@@ -3,16 +3,11 @@
 import { h, setText } from '../page/dom.js';
 import { clock, counted, duration } from '../page/format.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Call} Call */
-/** @typedef {import('../server').NextCall} NextCall */
-/** @typedef {import('../server').Reach} Reach */
-
 const AND = new Intl.ListFormat('en');
 
 export class Calls {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} key of the question
    */
   constructor(app, key) {
@@ -33,7 +28,7 @@ export class Calls {
 
 /** Who could not be reached lately, for whoever looks at the list. */
 export class Unreached {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.root = h('p', { class: 'problem unreached', role: 'status', hidden: true });
@@ -50,7 +45,7 @@ export class Unreached {
 }
 
 /**
- * @param {Reach} reach
+ * @param {server.Reach} reach
  * @param {string} key
  * @param {number} now
  */
@@ -63,7 +58,7 @@ function wordsOf({ calls, next }, key, now) {
 }
 
 /**
- * @param {Call} call
+ * @param {server.Call} call
  * @param {number} now
  */
 function callWords({ to, status, why, at }, now) {
@@ -74,7 +69,7 @@ function callWords({ to, status, why, at }, now) {
 }
 
 /**
- * @param {NextCall} next
+ * @param {server.NextCall} next
  * @param {number} now
  */
 function comingWords({ people, at }, now) {

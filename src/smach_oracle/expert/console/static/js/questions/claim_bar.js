@@ -2,12 +2,10 @@
 // Who works on a question, and how to take it.
 import { h, replace } from '../page/dom.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Question} Question */
 /**
  * @typedef {object} ClaimState
  * @property {boolean} settled this page has answered it
- * @property {Question | undefined} now undefined: it is open no longer
+ * @property {server.Question | undefined} now undefined: it is open no longer
  * @property {boolean} mine
  * @property {boolean} held this page has claimed it
  * @property {boolean} claiming
@@ -24,7 +22,7 @@ import { h, replace } from '../page/dom.js';
  * @property {() => void} claim
  * @property {() => void} takeOver
  */
-/** @typedef {{ kind: 'good' | 'warn' | '', words: Child }} Bar */
+/** @typedef {{ kind: 'good' | 'warn' | '', words: page.Child }} Bar */
 
 const CLOSED = 'This question is closed: it was answered elsewhere, taken back, or its time was '
   + 'over. ';
@@ -92,7 +90,7 @@ export class ClaimBar {
     return { kind: '', words: [FREE, take] };
   }
 
-  /** @returns {Child} */
+  /** @returns {page.Child} */
   yours() { return ['It is yours. ', button('Leave it to others', this.use.leave)]; }
 
   takeOver() { return button('Take it over', this.use.takeOver, 'take-over'); }

@@ -2,10 +2,6 @@
 // Who else looks at a question now.
 import { h, setText } from '../page/dom.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Onlooker} Onlooker */
-/** @typedef {import('../server').Question} Question */
-
 const PAUSE_MS = 1000; // turning the pages fast uses up no limit on commands
 const ELSEWHERE = ' (in another browser)';
 let wanted = ''; // the question that this page shows
@@ -13,8 +9,8 @@ let timer = 0;
 
 export class Onlookers {
   /**
-   * @param {App} app
-   * @param {Question} question
+   * @param {page.App} app
+   * @param {server.Question} question
    */
   constructor(app, question) {
     this.app = app;
@@ -46,7 +42,7 @@ export class Onlookers {
 
 /**
  * The others who look at a question, each browser once.
- * @param {App} app
+ * @param {page.App} app
  * @param {string} key
  */
 function namesOf(app, key) {
@@ -58,7 +54,7 @@ function namesOf(app, key) {
 
 /**
  * The names of the others who look at a question, in short.
- * @param {App} app
+ * @param {page.App} app
  * @param {string} key
  */
 export function readersOf(app, key) {
@@ -66,8 +62,8 @@ export function readersOf(app, key) {
 }
 
 /**
- * @param {App} app
- * @param {Onlooker} onlooker
+ * @param {page.App} app
+ * @param {server.Onlooker} onlooker
  */
 function nameOf(app, { name, role }) {
   if (name) return name + (name === app.expert ? ELSEWHERE : '');

@@ -1,14 +1,12 @@
 // @ts-check
 // Tells the console that the person who holds a question is still at it.
 
-/** @typedef {import('../page/types').App} App */
-
 const PAUSE_MS = 5000; // between two that are told
 const PRESSES = ['pointerdown', 'keydown', 'wheel'];
 
 /**
  * Begin: once a page.
- * @param {App} app
+ * @param {page.App} app
  * @param {() => string} held the question that this page holds, '' for none
  */
 export function tellPresses(app, held) {

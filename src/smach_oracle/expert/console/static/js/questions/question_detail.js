@@ -19,10 +19,6 @@ import { SilenceBar } from './silence_bar.js';
 import { failureCard, userdataCard, visitsCard } from './situation_cards.js';
 import { SituationCamera } from './situation_camera.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').Answer} Answer */
-/** @typedef {import('../server').Question} Question */
-
 const RETRY_MS = 3000; // after a claim that was lost, and could not be made again
 const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
   + 'answer twice does no harm.';
@@ -32,8 +28,8 @@ const UNKNOWN = 'The robot has not confirmed in time: whether it has your answer
 
 export class QuestionDetail {
   /**
-   * @param {App} app
-   * @param {Question} question as it was when it was chosen
+   * @param {page.App} app
+   * @param {server.Question} question as it was when it was chosen
    * @param {import('../answering/follow_up.js').Ways} ways
    */
   constructor(app, question, ways) {
@@ -185,7 +181,7 @@ export class QuestionDetail {
     this.show();
   }
 
-  /** @param {Answer} answer */
+  /** @param {server.Answer} answer */
   async answer(answer) {
     if (this.sending || this.settled || !this.mayBegin) return;
     this.sending = true;
@@ -203,7 +199,7 @@ export class QuestionDetail {
     if (!this.settled) this.form.takeFocusBack();
   }
 
-  /** @param {Answer} answer */
+  /** @param {server.Answer} answer */
   async send(answer) {
     const reply = await this.app.connection.request('answer', { question: this.key, ...answer });
     if (reply.ok) {
@@ -269,7 +265,7 @@ export class QuestionDetail {
   /**
    * What the robot does takes the place of what it could do; where the page is narrow it comes
    * first.
-   * @param {Pick<Answer, 'kind' | 'name' | 'container'>} answer
+   * @param {Pick<server.Answer, 'kind' | 'name' | 'container'>} answer
    */
   turnTo(answer) {
     const followUp = new FollowUp(this.app, this.question, this.ways);

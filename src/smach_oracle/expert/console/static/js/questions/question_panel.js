@@ -15,11 +15,7 @@ import { tellPresses } from './presence.js';
 import { QuestionDetail } from './question_detail.js';
 import { QueueTools, queueList } from './queue_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Panel} Panel */
-/** @typedef {import('../server').Question} Question */
-
-/** @type {Panel} */
+/** @type {page.Panel} */
 export const questions = { id: 'questions', title: 'Questions',
   create: (app) => new QuestionPanel(app) };
 
@@ -30,7 +26,7 @@ const GONE = 'The question of this address is not open: it was answered or taken
 const QUIET = 'Robots recover by themselves where they can; they ask here where they cannot.';
 
 class QuestionPanel {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     /** @type {QuestionDetail | AlikeAnswer | null} */

@@ -10,9 +10,6 @@ import { remember, remembered } from '../page/preferences.js';
 import { readersOf } from './onlookers.js';
 import { FILTERS, ORDERS, advice, causeOf, grouped, wanted } from './queue_wishes.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Question} Question */
 /** @typedef {import('./queue_wishes.js').Filter} Filter */
 /** @typedef {import('./queue_wishes.js').Group} Group */
 /** @typedef {import('./queue_wishes.js').Order} Order */
@@ -46,7 +43,7 @@ export class QueueTools {
 
   /**
    * The questions to show. Few are all shown, unless somebody has asked for less.
-   * @param {App} app
+   * @param {page.App} app
    * @returns {Group[]}
    */
   groups(app) {
@@ -85,10 +82,10 @@ function choiceOf(title, words, value, onchange) {
 
 /**
  * The list: groups of like questions under their heads, flat, so that what stays is never moved.
- * @param {App} app
+ * @param {page.App} app
  * @param {Group[]} groups
  * @param {Ways} ways
- * @returns {Child[]}
+ * @returns {page.Child[]}
  */
 export function queueList(app, groups, ways) {
   let before = false; // a group with a head
@@ -102,9 +99,9 @@ export function queueList(app, groups, ways) {
 }
 
 /**
- * @param {App} app
+ * @param {page.App} app
  * @param {string} alike
- * @param {Question[]} questions
+ * @param {server.Question[]} questions
  * @param {Ways} ways
  */
 function groupHead(app, alike, questions, { answerAlike }) {
@@ -117,8 +114,8 @@ function groupHead(app, alike, questions, { answerAlike }) {
 }
 
 /**
- * @param {App} app
- * @param {Question} question
+ * @param {page.App} app
+ * @param {server.Question} question
  * @param {Ways} ways
  */
 function card(app, question, { isChosen, choose }) {
@@ -136,7 +133,7 @@ function card(app, question, { isChosen, choose }) {
   adviceLine(question), severity(question), times(app, question));
 }
 
-/** @param {Question} question */
+/** @param {server.Question} question */
 function adviceLine(question) {
   const found = advice(question);
   if (!found) return null;
@@ -146,7 +143,7 @@ function adviceLine(question) {
     why ? 'recommended: ' + why : 'led on ' + helped + ' of ' + tried + ' before');
 }
 
-/** @param {Question} question */
+/** @param {server.Question} question */
 function severity({ class: rank, continuous, rate }) {
   const words = FAILURE_CLASSES[rank];
   return h('span', { class: 'chips' },
@@ -158,8 +155,8 @@ function severity({ class: rank, continuous, rate }) {
 }
 
 /**
- * @param {App} app
- * @param {Question} question
+ * @param {page.App} app
+ * @param {server.Question} question
  */
 function times(app, { asked, deadline, status }) {
   const now = app.store.now();
@@ -173,8 +170,8 @@ function times(app, { asked, deadline, status }) {
 }
 
 /**
- * @param {App} app
- * @param {Question} question
+ * @param {page.App} app
+ * @param {server.Question} question
  */
 function statusChip(app, question) {
   const { key, status, holder, interface: name } = question;

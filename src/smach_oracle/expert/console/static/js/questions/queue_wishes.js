@@ -2,7 +2,6 @@
 // Which of the open questions a person wants to see, and in which order. Pure.
 import { FAILURE_CLASSES } from '../page/format.js';
 
-/** @typedef {import('../server').Question} Question */
 /** @typedef {'oldest' | 'deadline' | 'severity' | 'robot'} Order */
 /** @typedef {'all' | 'waiting' | 'mine'} Filter */
 /**
@@ -12,7 +11,8 @@ import { FAILURE_CLASSES } from '../page/format.js';
  * @property {string} text what a card must have
  * @property {boolean} together whether like questions stand together
  */
-/** @typedef {{ alike: string, questions: Question[] }} Group */
+/** @typedef {{ alike: string, questions: server.Question[] }} Group */
+/** @typedef {(question: server.Question) => boolean} IsSuch */
 
 /** @type {{ [order in Order]: string }} */
 export const ORDERS = { oldest: 'Oldest first', deadline: 'Least time first',
@@ -20,7 +20,7 @@ export const ORDERS = { oldest: 'Oldest first', deadline: 'Least time first',
 /** @type {{ [filter in Filter]: string }} */
 export const FILTERS = { all: 'All', waiting: 'Nobody works on', mine: 'Mine' };
 
-/** @type {{ [order in Order]: (question: Question) => number | string }} */
+/** @type {{ [order in Order]: (question: server.Question) => number | string }} */
 const FIRST = {
   oldest: ({ asked }) => asked,
   deadline: ({ deadline }) => deadline ?? Infinity,
@@ -31,9 +31,9 @@ const FIRST = {
 
 /**
  * The questions that are wanted, in their order. Of equal ones the oldest is first.
- * @param {Question[]} open oldest first
+ * @param {server.Question[]} open oldest first
  * @param {Wishes} wishes
- * @param {{ waits: (question: Question) => boolean, isMine: (question: Question) => boolean }} is
+ * @param {{ waits: IsSuch, isMine: IsSuch }} is
  */
 export function wanted(open, { order, filter, text }, { waits, isMine }) {
   const words = text.toLowerCase().split(/\s+/).filter(Boolean);
@@ -57,7 +57,7 @@ function compare(one, other) {
 
 /**
  * All that is said of a question on its card, to be searched.
- * @param {Question} question
+ * @param {server.Question} question
  */
 function textOf({ robot, path, state, what, text, holder, class: rank }) {
   return [robot, path + '/' + state, what, text, holder, FAILURE_CLASSES[rank]].join(' ')
@@ -67,7 +67,7 @@ function textOf({ robot, path, state, what, text, holder, class: rank }) {
 /**
  * Like questions together, each group where its first one stands. Like are those about the same
  * state that has failed in the same way.
- * @param {Question[]} questions
+ * @param {server.Question[]} questions
  * @param {boolean} together else each is a group of its own
  * @returns {Group[]}
  */
@@ -86,7 +86,7 @@ export function grouped(questions, together) {
 
 /**
  * What to do about a question: what its robot recommends, else what led on most often before.
- * @param {Question} question
+ * @param {server.Question} question
  */
 export function advice({ choices }) {
   const choice = choices.find(({ recommended }) => recommended);

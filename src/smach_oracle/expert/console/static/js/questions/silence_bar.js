@@ -4,12 +4,11 @@ import { h, setText } from '../page/dom.js';
 import { aged } from '../page/liveness.js';
 
 /** @typedef {import('../page/liveness.js').Liveness} Liveness */
-/** @typedef {import('../server').Question} Question */
 
 export class SilenceBar {
   /**
    * @param {Liveness} liveness
-   * @param {Question} question
+   * @param {server.Question} question
    */
   constructor(liveness, question) {
     this.liveness = liveness;

@@ -5,9 +5,6 @@ import { h, options, replace, setText } from '../page/dom.js';
 import { CameraView } from '../sensors/camera_view.js';
 import { FailureImageView } from '../sensors/failure_image_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').KeptImage} KeptImage */
-/** @typedef {import('../server').Question} Question */
 /** @typedef {'then' | 'now'} Pane */
 
 const UNKNOWN = 'What it saw at the failure is not known.';
@@ -16,14 +13,14 @@ export const NO_CAMERA = 'No camera of its own. The console’s setting ~cameras
 
 export class SituationCamera {
   /**
-   * @param {App} app
-   * @param {Question} question
+   * @param {page.App} app
+   * @param {server.Question} question
    */
   constructor(app, question) {
     this.app = app;
     this.question = question;
     this.live = false;
-    /** @type {KeptImage[]} */
+    /** @type {server.KeptImage[]} */
     this.images = []; // of the failure
     /** @type {number | null} */
     this.shownImage = null;
@@ -103,7 +100,7 @@ export class SituationCamera {
     }
   }
 
-  /** @param {KeptImage | undefined} image */
+  /** @param {server.KeptImage | undefined} image */
   showImage(image) {
     const id = image ? image.id : null;
     if (id === this.shownImage) return;

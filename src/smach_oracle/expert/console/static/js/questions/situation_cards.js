@@ -3,13 +3,7 @@
 import { h } from '../page/dom.js';
 import { FAILURE_CLASSES, breakable, chip, rateBar } from '../page/format.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').LevelVisits} LevelVisits */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').UserdataItem} UserdataItem */
-/** @typedef {import('../server').Visit} Visit */
-
-/** @type {{ [result in Visit['result']]: { sign: string, kind: string } }} */
+/** @type {{ [result in server.Visit['result']]: { sign: string, kind: string } }} */
 const RESULTS = { success: { sign: '✓', kind: 'good' }, failure: { sign: '✗', kind: 'bad' },
   superseded: { sign: '☞', kind: 'accent' }, preempted: { sign: '■', kind: 'warn' },
   '': { sign: '?', kind: '' } };
@@ -21,7 +15,7 @@ const LONG = 160; // characters of a value
 const BEGINNING = 80;
 const CONTINUOUS = 'It failed again without a success in between';
 
-/** @param {Question} question */
+/** @param {server.Question} question */
 export function failureCard(question) {
   const { state, what, text } = question;
   return h('section', { class: 'card failure' },
@@ -31,8 +25,8 @@ export function failureCard(question) {
 }
 
 /**
- * @param {Question} question
- * @returns {Child}
+ * @param {server.Question} question
+ * @returns {page.Child}
  */
 function failureFacts(question) {
   const { rate, class: rank, continuous, reason, recoveries, tried, deadline, fallback } = question;
@@ -50,17 +44,17 @@ function failureFacts(question) {
 
 /**
  * @param {string} name
- * @param {Child} value
- * @returns {Child}
+ * @param {page.Child} value
+ * @returns {page.Child}
  */
 function fact(name, value) {
   return [h('dt', {}, name), h('dd', {}, value)];
 }
 
-/** @param {Question} question */
+/** @param {server.Question} question */
 export function visitsCard({ path, state, history, above }) {
   const cut = history.length > MOST_VISITS ? 'older' : '';
-  /** @type {LevelVisits} */
+  /** @type {server.LevelVisits} */
   const own = { path, state, visits: history.slice(-MOST_VISITS), missing: cut };
   return (history.length > 0 || above.length > 0) && h('section', { class: 'card way' },
     h('h3', {}, 'How it came here'),
@@ -70,7 +64,7 @@ export function visitsCard({ path, state, history, above }) {
 
 /**
  * The visits of one container.
- * @param {LevelVisits} level
+ * @param {server.LevelVisits} level
  * @param {boolean} runs whether its state is one that the way goes on in
  */
 function levelOf({ path, state, visits, missing }, runs) {
@@ -83,14 +77,14 @@ function levelOf({ path, state, visits, missing }, runs) {
         : !visits.length && h('li', { class: 'missing' }, 'nothing before')));
 }
 
-/** @param {Visit} visit */
+/** @param {server.Visit} visit */
 function visitItem({ state, outcome, result }) {
   const { sign, kind } = RESULTS[result];
   return h('li', { class: kind, title: outcome }, state, ' ', h('span', { class: 'sign' }, sign),
     result === 'failure' && outcome && h('span', { class: 'dim' }, ' ' + outcome));
 }
 
-/** @param {Question} question */
+/** @param {server.Question} question */
 export function userdataCard({ userdata }) {
   return userdata.length > 0 && h('section', { class: 'card' }, h('h3', {}, 'Userdata'),
     h('table', { class: 'userdata' }, h('tbody', {}, userdata.map((item) => (
@@ -98,8 +92,8 @@ export function userdataCard({ userdata }) {
 }
 
 /**
- * @param {UserdataItem} item
- * @returns {Child}
+ * @param {server.UserdataItem} item
+ * @returns {page.Child}
  */
 function valueOf({ type, value, note }) {
   const notes = note && h('span', { class: 'dim' }, ' ' + note);

@@ -6,9 +6,6 @@ import { FAILURE_CLASSES, chip, counted, percent, rateBar, times } from '../page
 import { redraw } from '../page/redraw.js';
 import { activeIn, focusState } from './focus_state.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Graph} Graph */
-/** @typedef {import('./types').MachineState} MachineState */
 /**
  * @typedef {object} Way a transition, as a row
  * @property {string} label of the state at its other end
@@ -49,8 +46,8 @@ export class AroundView {
 
   /**
    * @param {string} robot
-   * @param {Graph} graph
-   * @param {MachineState} machine
+   * @param {server.Graph} graph
+   * @param {machine.MachineState} machine
    */
   set(robot, graph, machine) {
     const place = robot + ' ' + graph.path;
@@ -70,8 +67,8 @@ export class AroundView {
 
   /**
    * @param {Way[]} ways
-   * @param {Graph} graph
-   * @returns {Child[]}
+   * @param {server.Graph} graph
+   * @returns {page.Child[]}
    */
   rows(ways, { states, oracle }) {
     if (!ways.length) return [h('li', { class: 'dim' }, 'nothing')];
@@ -91,10 +88,10 @@ export class AroundView {
 /**
  * @param {string} robot
  * @param {string} label
- * @param {Graph} graph
- * @param {MachineState} machine
+ * @param {server.Graph} graph
+ * @param {machine.MachineState} machine
  * @param {(path: string) => void} onOpen
- * @returns {Child[]}
+ * @returns {page.Child[]}
  */
 function stateFacts(robot, label, { path, states }, machine, onOpen) {
   const learned = machine.rates[path]?.[label];
@@ -115,8 +112,8 @@ function stateFacts(robot, label, { path, states }, machine, onOpen) {
 
 /**
  * @param {string} label
- * @param {Graph} graph
- * @param {MachineState} machine
+ * @param {server.Graph} graph
+ * @param {machine.MachineState} machine
  */
 function waysFrom(label, { path, edges }, machine) {
   const counts = (machine.counts[path] || []).filter(([from]) => from === label);
@@ -130,8 +127,8 @@ function waysFrom(label, { path, edges }, machine) {
 
 /**
  * @param {string} label
- * @param {Graph} graph
- * @param {MachineState} machine
+ * @param {server.Graph} graph
+ * @param {machine.MachineState} machine
  */
 function waysTo(label, { path, edges }, machine) {
   const counts = (machine.counts[path] || []).filter(([, , to]) => to === label);

@@ -3,8 +3,6 @@
 import { unlessLost } from '../page/connection.js';
 import { h, options, replace, setText, toast } from '../page/dom.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').DownMachine} DownMachine */
 /** @typedef {'goto_stored' | 'edit_stored' | 'drop_stored'} Change */
 
 const NEEDS_ROLE = 'To change it needs the role of an operator.';
@@ -13,8 +11,8 @@ const TO_DROP = 'Drop the trial? It is never resumed. When its program is starte
 
 export class DownChanges {
   /**
-   * @param {App} app
-   * @param {DownMachine} row
+   * @param {page.App} app
+   * @param {server.DownMachine} row
    */
   constructor(app, row) {
     this.app = app;
@@ -44,7 +42,7 @@ export class DownChanges {
       this.reply);
   }
 
-  /** @param {DownMachine} row */
+  /** @param {server.DownMachine} row */
   show(row) {
     this.row = row;
     const states = JSON.stringify(row.states);
@@ -134,7 +132,7 @@ export class DownChanges {
    * Whether it was done.
    * @template {Change} Name
    * @param {Name} name
-   * @param {import('../server').Commands[Name]} args
+   * @param {server.Commands[Name]} args
    */
   async send(name, args) {
     setText(this.problem, '');

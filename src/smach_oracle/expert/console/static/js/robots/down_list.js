@@ -5,11 +5,8 @@ import { duration } from '../page/format.js';
 import { arrange } from '../page/redraw.js';
 import { DownMachineView } from './down_machine.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').DownMachine} DownMachine */
-
 export class DownList {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.root = h('section', { class: 'card down-machines', 'aria-label': 'Machines that are down',
@@ -38,7 +35,7 @@ export class DownList {
       row.problem ? h('p', { class: 'down-problem' }, row.problem) : this.viewOf(row).root)));
   }
 
-  /** @param {DownMachine} row */
+  /** @param {server.DownMachine} row */
   viewOf(row) {
     const known = this.views.get(row.key);
     if (known) return known;

@@ -5,16 +5,13 @@ import { clock } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { DownChanges } from './down_changes.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').DownMachine} DownMachine */
-
 const GOES_ON = 'Goes on when its program is started again. By default it asks a person first.';
 const TO_LOOK = 'To look closer, on the computer of its store:';
 
 export class DownMachineView {
   /**
-   * @param {App} app
-   * @param {DownMachine} row
+   * @param {page.App} app
+   * @param {server.DownMachine} row
    */
   constructor(app, row) {
     this.key = '';
@@ -27,7 +24,7 @@ export class DownMachineView {
   }
 
   /**
-   * @param {DownMachine} row
+   * @param {server.DownMachine} row
    * @param {string} age
    */
   show(row, age) {

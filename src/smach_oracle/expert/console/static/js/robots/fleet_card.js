@@ -7,7 +7,6 @@ import { aged } from '../page/liveness.js';
 import { redraw } from '../page/redraw.js';
 import { resumedWords } from './fleet_facts.js';
 
-/** @typedef {import('../page/types').App} App */
 /** @typedef {import('./fleet_facts.js').RobotFacts} RobotFacts */
 /** @typedef {import('./fleet_facts.js').Standing} Standing */
 /** @typedef {'stop' | 'pause' | 'resume'} FleetOrder */
@@ -22,7 +21,7 @@ const MOST_STATES = 3; // that run beside each other
 
 export class FleetCard {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} robot
    * @param {(order: FleetOrder, robot: string) => void} send
    * @param {() => void} choose it was chosen, or is no longer
@@ -110,7 +109,7 @@ function rateOf(rate) {
   return rate !== null && rateBar(rate, undefined, 'est. ' + percent(rate) + ' fail');
 }
 
-/** @param {import('../server').Battery} battery */
+/** @param {server.Battery} battery */
 function batteryWords({ share, volts, charging, low, old }) {
   const charge = share === null ? '' : percent(share);
   const parts = [charge, volts === null ? '' : volts.toFixed(1) + ' V', charging && 'charging',

@@ -3,10 +3,6 @@
 import { activeIn } from './focus_state.js';
 import { isOracle, listed, resumable, running, waiting } from './hand_words.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').HeldMachine} HeldMachine */
-/** @typedef {import('../server').Question} Question */
-/** @typedef {import('../server').RobotHealth} RobotHealth */
 /** @typedef {'waits' | 'held' | 'unwell' | 'silent' | 'asked' | 'paused' | 'runs' | 'idle'
  *   | 'gone'} Standing */
 /** @typedef {{ state: string, path: string, rate: number | null }} ActivePlace */
@@ -15,13 +11,13 @@ import { isOracle, listed, resumable, running, waiting } from './hand_words.js';
  * @property {string} robot
  * @property {Standing} standing
  * @property {string} why what makes it stand so, for a title
- * @property {Question | undefined} question the one that has waited longest
+ * @property {server.Question | undefined} question the one that has waited longest
  * @property {number} questions
  * @property {ActivePlace[]} active
  * @property {string} path of its first machine
  * @property {boolean} holdable
- * @property {HeldMachine[]} paused
- * @property {RobotHealth | undefined} health
+ * @property {server.HeldMachine[]} paused
+ * @property {server.RobotHealth | undefined} health
  * @property {{ words: string, at: number } | null} last
  */
 
@@ -53,7 +49,7 @@ export function needsHelp(facts) { return needOf(facts) <= ORDER.indexOf('silent
 
 /**
  * All robots: those that are followed, and those that only ask.
- * @param {App} app
+ * @param {page.App} app
  */
 export function robotsOf({ store }) {
   const names = new Set([...(store.get('robots') || []), ...store.questions.map((q) => q.robot)]);
@@ -61,7 +57,7 @@ export function robotsOf({ store }) {
 }
 
 /**
- * @param {App} app
+ * @param {page.App} app
  * @param {string} robot
  * @returns {RobotFacts}
  */
@@ -80,10 +76,10 @@ export function factsOf(app, robot) {
 }
 
 /**
- * @param {App} app
+ * @param {page.App} app
  * @param {string} robot
- * @param {Question[]} asked
- * @param {Question[]} waits
+ * @param {server.Question[]} asked
+ * @param {server.Question[]} waits
  * @returns {{ standing: Standing, why: string }}
  */
 function standingOf({ store, liveness }, robot, asked, waits) {
@@ -109,7 +105,7 @@ function standingOf({ store, liveness }, robot, asked, waits) {
 
 /**
  * The innermost states that run, with what was learned of them.
- * @param {import('../server').LiveMachines} live
+ * @param {server.LiveMachines} live
  * @returns {ActivePlace[]}
  */
 function placesOf(live) {

@@ -9,12 +9,10 @@ import { arrange } from '../page/redraw.js';
 import { FleetCard } from './fleet_card.js';
 import { byNeed, factsOf, needsHelp, resumedWords, robotsOf } from './fleet_facts.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Panel} Panel */
 /** @typedef {import('./fleet_card.js').FleetOrder} FleetOrder */
 /** @typedef {import('./fleet_facts.js').RobotFacts} RobotFacts */
 
-/** @type {Panel} */
+/** @type {page.Panel} */
 export const fleet = { id: 'fleet', title: 'Robots', create: (app) => new FleetPanel(app) };
 
 const NO_ROBOTS = 'No robots yet. Every state machine that runs under the oracle, or publishes its '
@@ -25,7 +23,7 @@ const BETWEEN_MS = 200; // two drawings
 const AT_REST_MS = 4000; // since a person has touched the list: only then cards change places
 
 class FleetPanel {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     /** @type {Map<string, FleetCard>} */

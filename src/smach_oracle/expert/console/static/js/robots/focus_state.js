@@ -1,13 +1,10 @@
 // @ts-check
 // Which state of a container people want to see first.
 
-/** @typedef {import('../server').Graph} Graph */
-/** @typedef {import('./types').MachineState} MachineState */
-
 /**
  * The states of a container that are active now.
  * @param {string} path
- * @param {MachineState} machine
+ * @param {machine.MachineState} machine
  */
 export function activeIn(path, machine) {
   return machine.alive ? machine.active[path] || [] : [];
@@ -15,8 +12,8 @@ export function activeIn(path, machine) {
 
 /**
  * The state that failed, else one that is active; '' where there is none.
- * @param {Graph} graph
- * @param {MachineState} machine
+ * @param {server.Graph} graph
+ * @param {machine.MachineState} machine
  */
 export function focusState({ path, states }, machine) {
   const failed = machine.failed[path]?.state;

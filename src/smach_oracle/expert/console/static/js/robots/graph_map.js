@@ -3,7 +3,6 @@
 // the pointer: the keyboard has search and arrow keys.
 import { svg } from '../page/dom.js';
 
-/** @typedef {import('../server').Graph} Graph */
 /** @typedef {import('./graph_viewport.js').Place} Place */
 /** @typedef {import('./graph_viewport.js').Seen} Seen */
 /** @typedef {import('./graph_viewport.js').Size} Size */
@@ -26,7 +25,7 @@ export class GraphMap {
     this.root.style.display = 'none';
   }
 
-  /** @param {Graph} graph */
+  /** @param {server.Graph} graph */
   set({ states }) {
     this.boxes = new Map(states.flatMap(({ label, at }) => (at ? [[label,
       svg('rect', { x: at[0] - at[2] / 2, y: at[1] - at[3] / 2, width: at[2], height: at[3] })]]

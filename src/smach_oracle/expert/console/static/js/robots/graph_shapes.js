@@ -2,9 +2,6 @@
 // The shapes of a drawn container: states, outcomes, edges, and ORACLE with its rail.
 import { svg } from '../page/dom.js';
 
-/** @typedef {import('../server').Graph} Graph */
-/** @typedef {import('../server').GraphEdge} GraphEdge */
-/** @typedef {import('../server').Place} Place */
 /**
  * @typedef {object} EdgeShape
  * @property {SVGGElement} group
@@ -39,7 +36,7 @@ export function arrowHeads() {
 
 /**
  * Where the rail of ORACLE begins, and how large the whole is, px.
- * @param {Graph} graph
+ * @param {server.Graph} graph
  */
 export function measured({ size, oracle }) {
   const [width, height] = size || [0, 0];
@@ -74,7 +71,7 @@ function shorten(text, width) {
 function translate(x, y) { return 'translate(' + x + ' ' + y + ')'; }
 
 /**
- * @param {GraphEdge} edge
+ * @param {server.GraphEdge} edge
  * @returns {EdgeShape}
  */
 export function edgeShape({ from, outcome, to, points, label: place }) {
@@ -103,7 +100,7 @@ function oracleLine(from, to, [x1, y1, x2], rail) {
 
 /**
  * All edges of ORACLE.
- * @param {Graph} graph
+ * @param {server.Graph} graph
  * @returns {EdgeShape[]}
  */
 export function oracleLines({ oracle, states, outcomes, ...graph }) {
@@ -123,7 +120,7 @@ export function oracleLines({ oracle, states, outcomes, ...graph }) {
 
 /**
  * The rail.
- * @param {Graph} graph
+ * @param {server.Graph} graph
  * @param {string} id
  */
 export function oracleShape(graph, id) {
@@ -140,7 +137,7 @@ export function oracleShape(graph, id) {
 /**
  * An outcome of the container.
  * @param {string} label
- * @param {Place} place
+ * @param {server.Place} place
  * @param {string} id
  * @param {number} bundled states that lead there by a preemption, whose edges are not drawn
  */
@@ -165,7 +162,7 @@ function openByKey(event, open) {
 
 /**
  * @param {string} label
- * @param {Place} place
+ * @param {server.Place} place
  * @param {string} id
  * @param {(() => void) | null} open where it is a container itself
  * @returns {StateShape}

@@ -12,12 +12,8 @@ import { takeGraphKeys } from './graph_keys.js';
 import { GraphMap } from './graph_map.js';
 import { GraphViewport } from './graph_viewport.js';
 
-/** @typedef {import('../server').Graph} Graph */
-/** @typedef {import('../server').TransitionCount} TransitionCount */
 /** @typedef {import('./graph_shapes.js').EdgeShape} EdgeShape */
 /** @typedef {import('./graph_shapes.js').StateShape} StateShape */
-/** @typedef {import('./types').MachineState} MachineState */
-/** @typedef {import('./types').ShownRate} ShownRate */
 /** @typedef {{ times: number, share: number }} Taken how often an edge was */
 
 const CLOSER = 1.3;
@@ -34,7 +30,7 @@ export class GraphView {
     this.map = new GraphMap((at) => this.viewport.showMiddle(at));
     this.root = h('div', { class: 'graph-frame' }, this.drawing, this.map.root, this.tools());
     this.robot = '';
-    /** @type {Graph | null} */
+    /** @type {server.Graph | null} */
     this.graph = null;
     this.key = ''; // of what is drawn
     this.focusKey = ''; // of what is in view
@@ -65,7 +61,7 @@ export class GraphView {
 
   /**
    * @param {string} robot
-   * @param {Graph} graph
+   * @param {server.Graph} graph
    */
   set(robot, graph) {
     const key = JSON.stringify([robot, graph]);
@@ -85,7 +81,7 @@ export class GraphView {
     this.viewport.place();
   }
 
-  /** @param {Graph} graph */
+  /** @param {server.Graph} graph */
   draw(graph) {
     /** @param {string} label */
     const id = (label) => this.robot + '/' + graph.path + '/' + label;
@@ -133,7 +129,7 @@ export class GraphView {
 
   /**
    * What is active, learned and counted.
-   * @param {MachineState} machine
+   * @param {machine.MachineState} machine
    */
   setState(machine) {
     if (!this.graph || !this.graph.drawn) return;
@@ -170,7 +166,7 @@ export class GraphView {
   }
 
   /**
-   * @param {TransitionCount[]} counts
+   * @param {server.TransitionCount[]} counts
    * @param {[from: string, to: string] | undefined} latest
    * @param {string} failed
    */
@@ -188,7 +184,7 @@ export class GraphView {
 
   /**
    * By the keys of edges.
-   * @param {TransitionCount[]} counts
+   * @param {server.TransitionCount[]} counts
    */
   takenEdges(counts) {
     /** @type {Map<string, Taken>} */
@@ -220,7 +216,7 @@ function pairKey(from, to) { return JSON.stringify([from, to]); }
 /**
  * @param {StateShape} state
  * @param {string} label
- * @param {ShownRate | undefined} learned
+ * @param {machine.ShownRate | undefined} learned
  */
 function showRate({ group, rate, title }, label, learned) {
   const known = Boolean(learned && learned.rate !== null);

@@ -1,28 +1,26 @@
 // @ts-check
 // How a machine stands as its operators see it, in words.
 
-/** @typedef {import('../server').ActiveState} ActiveState */
-/** @typedef {import('../server').HeldMachine} HeldMachine */
 /** @typedef {import('../page/store.js').Store} Store */
 
 /**
  * The machine to which a container belongs; undefined where it is of none.
- * @param {HeldMachine[]} machines
+ * @param {server.HeldMachine[]} machines
  * @param {string} path
  */
 export function machineOf(machines, path) {
   return machines.find((each) => (path + '/').startsWith(each.path + '/'));
 }
 
-/** @param {ActiveState} active */
+/** @param {server.ActiveState} active */
 function inWords({ state, path }) { return state + ' in ' + path; }
 
-/** @param {ActiveState[]} states */
+/** @param {server.ActiveState[]} states */
 export function listed(states) { return states.map(inWords).join(', '); }
 
 /**
  * The states that run, but for those within which others are active.
- * @param {HeldMachine} machine
+ * @param {server.HeldMachine} machine
  */
 export function running({ active }) {
   const around = new Set(active.map(({ path }) => path));
@@ -31,22 +29,22 @@ export function running({ active }) {
 
 /**
  * What waits.
- * @param {HeldMachine} machine
+ * @param {server.HeldMachine} machine
  */
 export function waiting({ active }) { return active.filter(({ held }) => held); }
 
 /**
  * What waits for nothing but that the pause is lifted.
- * @param {HeldMachine} machine
+ * @param {server.HeldMachine} machine
  */
 export function resumable(machine) { return waiting(machine).filter(({ confirm }) => !confirm); }
 
 /**
  * By the container that waits before them.
- * @param {ActiveState[]} states
+ * @param {server.ActiveState[]} states
  */
 export function byContainer(states) {
-  /** @type {Map<string, ActiveState[]>} */
+  /** @type {Map<string, server.ActiveState[]>} */
   const found = new Map();
   for (const each of states) found.set(each.path, [...(found.get(each.path) || []), each]);
   return [...found];
@@ -55,7 +53,7 @@ export function byContainer(states) {
 /**
  * Whether a state is the oracle of its container. One that has not been heard to act is the state
  * that no rates are told of.
- * @param {Pick<ActiveState, 'path' | 'state'>} active
+ * @param {Pick<server.ActiveState, 'path' | 'state'>} active
  * @param {string} robot
  * @param {Pick<Store, 'get'>} store
  */
@@ -67,7 +65,7 @@ export function isOracle({ path, state }, robot, store) {
 
 /**
  * What the oracle of a container is at, as a sentence; '' where the state is no oracle.
- * @param {ActiveState} active
+ * @param {server.ActiveState} active
  * @param {string} robot
  * @param {Pick<Store, 'get' | 'questions'>} store
  */
@@ -82,7 +80,7 @@ function oracleWords(active, robot, store) {
 }
 
 /**
- * @param {HeldMachine} machine
+ * @param {server.HeldMachine} machine
  * @param {string} robot
  * @param {Pick<Store, 'get' | 'questions'>} store for what an oracle is at
  */

@@ -9,8 +9,6 @@ import { redraw } from '../page/redraw.js';
 import { Breakpoints } from './breakpoints.js';
 import { byContainer, listed, machineOf, resumable, standingWords, waiting } from './hand_words.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').HeldMachine} HeldMachine */
 /** @typedef {'stop_machine' | 'pause_machine'} Stop */
 /** @typedef {'resume_machine' | 'step_machine' | 'confirm_state'} Start */
 
@@ -19,7 +17,7 @@ const REPLY_LASTS_MS = 20000; // it is of the past then
 const NEEDS_ROLE = 'To let it go on needs the role of an operator.';
 
 export class MachineHand {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.robot = '';
@@ -46,7 +44,7 @@ export class MachineHand {
 
   /**
    * How the machine stands; undefined where it cannot be held.
-   * @returns {HeldMachine | undefined}
+   * @returns {server.HeldMachine | undefined}
    */
   get machine() {
     return machineOf(this.app.store.get(`live ${this.robot}`)?.control || [], this.path);
@@ -82,14 +80,14 @@ export class MachineHand {
 
   /**
    * Of a pause the line above says the same as soon as the robot tells it.
-   * @param {HeldMachine} machine
+   * @param {server.HeldMachine} machine
    */
   replyIsOver(machine) {
     const { to, at } = this.replied;
     return (to === 'pause_machine' && machine.paused) || performance.now() - at > REPLY_LASTS_MS;
   }
 
-  /** @param {HeldMachine} machine */
+  /** @param {server.HeldMachine} machine */
   showGoOn(machine) {
     const { app, robot } = this;
     const may = app.mayAnswer && app.connection.connected && !app.liveness.whoOf(robot);

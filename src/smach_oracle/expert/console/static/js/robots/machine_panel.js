@@ -8,8 +8,6 @@ import { DownList } from './down_list.js';
 import { MachineHand } from './machine_hand.js';
 import { MachineView, machinesNow } from './machine_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Panel} Panel */
 /**
  * @typedef {object} PickerRow
  * @property {string} path
@@ -19,7 +17,7 @@ import { MachineView, machinesNow } from './machine_view.js';
  */
 /** @typedef {{ robot: string, alive: boolean | undefined, rows: PickerRow[] }} PickerGroup */
 
-/** @type {Panel} */
+/** @type {page.Panel} */
 export const machines = { id: 'machines', title: 'Machines',
   create: (app) => new MachinePanel(app) };
 
@@ -27,7 +25,7 @@ const NO_ROBOTS = 'No robots yet. Every state machine that publishes its structu
   + 'the oracle, appears here by itself.';
 
 class MachinePanel {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.robot = '';

@@ -9,9 +9,6 @@ import { StateList } from './state_list.js';
 import { StateSearch } from './state_search.js';
 
 /** @typedef {import('../page/store.js').Store} Store */
-/** @typedef {import('../server').Graph} Graph */
-/** @typedef {import('./types').MachineSource} MachineSource */
-/** @typedef {import('./types').MachineState} MachineState */
 
 const UNKNOWN = 'Nothing is known of this machine. It is shown while its introspection is on.';
 const NOT_DRAWN = 'There is no drawing of it, or not yet. Drawings need Graphviz on the console’s '
@@ -29,7 +26,7 @@ const WAYS = [['graph', 'Graph', 'All states, drawn'],
 /**
  * Machines as they are now.
  * @param {Store} store
- * @returns {MachineSource}
+ * @returns {machine.MachineSource}
  */
 export function machinesNow(store) {
   return {
@@ -43,12 +40,12 @@ export function machinesNow(store) {
  * failure.
  * @param {Store} store
  * @param {string} robot
- * @returns {MachineState}
+ * @returns {machine.MachineState}
  */
 function machineState(store, robot) {
   const live = store.get(`live ${robot}`);
   if (!live) return { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
-  /** @type {MachineState['failed']} */
+  /** @type {machine.MachineState['failed']} */
   const failed = { ...live.failed };
   for (const question of store.questions) {
     const { path, state, running } = question;
@@ -59,7 +56,7 @@ function machineState(store, robot) {
 
 export class MachineView {
   /**
-   * @param {MachineSource} source
+   * @param {machine.MachineSource} source
    * @param {(path: string) => void} onOpen a nested container was chosen
    */
   constructor(source, onOpen) {
@@ -138,7 +135,7 @@ export class MachineView {
 /**
  * How a container is shown: as this person wants it, else as it can be read; '' where nothing is
  * told.
- * @param {Graph} graph
+ * @param {server.Graph} graph
  * @returns {Way | ''}
  */
 function wayOf({ drawn, states, refused }) {
@@ -151,8 +148,8 @@ function wayOf({ drawn, states, refused }) {
 
 /**
  * Why there is no drawing, or no state at all.
- * @param {Graph} graph
- * @param {MachineState} machine
+ * @param {server.Graph} graph
+ * @param {machine.MachineState} machine
  */
 function noteOn({ path, drawn, states, refused }, machine) {
   if (refused) {

@@ -5,10 +5,6 @@ import { FAILURE_CLASSES, chip, percent, rateBar } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { activeIn, focusState } from './focus_state.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Graph} Graph */
-/** @typedef {import('./types').MachineState} MachineState */
-
 const TITLES = ['State', 'Failure rate', 'Class', 'Ok / failed', 'Leads to'];
 
 export class StateList {
@@ -25,8 +21,8 @@ export class StateList {
 
   /**
    * @param {string} robot
-   * @param {Graph} graph
-   * @param {MachineState} machine
+   * @param {server.Graph} graph
+   * @param {machine.MachineState} machine
    * @param {(label: string) => boolean} wanted
    */
   set(robot, graph, machine, wanted = () => true) {
@@ -59,8 +55,8 @@ export class StateList {
    * @param {string} id
    * @param {string} label
    * @param {boolean} nested
-   * @param {Graph} graph
-   * @param {MachineState} machine
+   * @param {server.Graph} graph
+   * @param {machine.MachineState} machine
    */
   row(id, label, nested, graph, machine) {
     const { path } = graph;
@@ -84,9 +80,9 @@ export class StateList {
 /**
  * Where a state leads, and how often it did.
  * @param {string} label
- * @param {Graph} graph
- * @param {MachineState} machine
- * @returns {Child}
+ * @param {server.Graph} graph
+ * @param {machine.MachineState} machine
+ * @returns {page.Child}
  */
 function leadsTo(label, { path, edges, oracle }, machine) {
   const counts = (machine.counts[path] || []).filter(([from]) => from === label);

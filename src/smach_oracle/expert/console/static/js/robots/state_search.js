@@ -3,8 +3,6 @@
 import { h, setText } from '../page/dom.js';
 import { counted } from '../page/format.js';
 
-/** @typedef {import('../server').Graph} Graph */
-
 const FROM = 12; // states: fewer are seen at a glance
 
 export class StateSearch {
@@ -32,7 +30,7 @@ export class StateSearch {
     this.at = 0;
   }
 
-  /** @param {Graph} graph */
+  /** @param {server.Graph} graph */
   set({ states }) {
     this.labels = states.map(({ label }) => label);
     this.root.hidden = this.labels.length < FROM;

@@ -1,6 +1,8 @@
 // Shapes of machines as they are drawn.
 import { ByPath, ByState, Graph, HeldMachine, LearnedRate, TransitionCount } from '../server';
 
+export as namespace machine;
+
 /** What the containers of a robot do at a moment. */
 export interface MachineState {
   alive?: boolean; // false: the robot is gone

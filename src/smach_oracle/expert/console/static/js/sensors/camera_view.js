@@ -5,12 +5,9 @@ import { drawImage, imageCanvas } from './image_canvas.js';
 import { ImageAge } from './image_age.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').ImageFacts} ImageFacts */
-
 export class CameraView {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} topic
    * @param {string} [type]
    * @param {number} [width] px
@@ -25,7 +22,7 @@ export class CameraView {
       h('div', { class: 'screen' }, this.canvas, this.note, this.range),
       h('figcaption', { class: 'row' }, h('span', { class: 'ellipsis' }, topic),
         h('span', { class: 'spacer' }), this.age.root, this.rate));
-    /** @type {SensorFeed<ImageFacts>} */
+    /** @type {SensorFeed<server.ImageFacts>} */
     this.feed = new SensorFeed(app, () => numberOf(app, topic, type), this.root,
       { width, take: (answer, facts) => this.take(answer, facts), say: (text) => this.say(text) });
   }
@@ -47,7 +44,7 @@ export class CameraView {
 
   /**
    * @param {Response} answer
-   * @param {ImageFacts} facts
+   * @param {server.ImageFacts} facts
    */
   async take(answer, { range, age }) {
     await drawImage(this.canvas, answer);

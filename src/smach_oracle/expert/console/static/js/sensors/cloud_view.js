@@ -3,11 +3,9 @@
 import { LiveScene } from './live_scene.js';
 import { ROBOT, robotOf, robotsOf } from './robot_feed.js';
 
-/** @typedef {import('../page/types').App} App */
-
 export class CloudView extends LiveScene {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} topic
    * @param {string} type
    */

@@ -7,13 +7,10 @@ import { drawImage, imageCanvas } from './image_canvas.js';
 
 const FAR_S = 10;
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').KeptImage} KeptImage */
-
 export class FailureImageView {
   /**
-   * @param {App} app
-   * @param {KeptImage} image
+   * @param {page.App} app
+   * @param {server.KeptImage} image
    */
   constructor(app, image) {
     const { id, topic, size: [width, height] } = image;
@@ -30,7 +27,7 @@ export class FailureImageView {
   }
 
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {number} id
    */
   async fetch(app, id) {
@@ -50,7 +47,7 @@ export class FailureImageView {
   }
 }
 
-/** @param {KeptImage} image */
+/** @param {server.KeptImage} image */
 function whenTaken({ late, stamped }) {
   if (late === null) return 'at the failure';
   const when = Math.abs(late) < 1 ? 'at the question'
@@ -60,7 +57,7 @@ function whenTaken({ late, stamped }) {
 
 /**
  * Whether it may show something else than the failure.
- * @param {KeptImage} image
+ * @param {server.KeptImage} image
  */
 function isFar({ late, stamped }) {
   return late !== null && (!stamped || Math.abs(late) > FAR_S);

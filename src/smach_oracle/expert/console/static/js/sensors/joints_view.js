@@ -5,9 +5,6 @@ import { arrange } from '../page/redraw.js';
 import { HUES, JointPlot, SPAN_S } from './joint_plot.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').JointFacts} JointFacts */
-/** @typedef {import('../server').JointRow} JointRow */
 /** @typedef {import('./joint_plot.js').Sample} Sample */
 /** @typedef {{ cells: HTMLElement[], button: HTMLElement, root: HTMLElement }} Row */
 
@@ -17,7 +14,7 @@ const QUANTITIES = ['position', 'velocity', 'effort'];
 
 export class JointsView {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} topic
    * @param {string} type
    */
@@ -26,7 +23,7 @@ export class JointsView {
     this.chosen = [];
     /** @type {Map<string, Row>} */
     this.rows = new Map();
-    /** @type {{ time: number, joints: Map<string, JointRow> }[]} */
+    /** @type {{ time: number, joints: Map<string, server.JointRow> }[]} */
     this.samples = [];
     this.quantity = 0;
     this.plot = new JointPlot();
@@ -38,7 +35,7 @@ export class JointsView {
       h('button', { class: 'tool', onclick: () => this.choose(index) }, name)));
     this.root = this.build(topic);
     this.choose(0);
-    /** @type {SensorFeed<JointFacts>} */
+    /** @type {SensorFeed<server.JointFacts>} */
     this.feed = new SensorFeed(app, () => numberOf(app, topic, type), this.root,
       { every: PERIOD_MS, take: (_, facts) => this.take(facts), say: (text) => this.say(text) });
   }
@@ -74,7 +71,7 @@ export class JointsView {
     this.draw();
   }
 
-  /** @param {JointFacts} facts */
+  /** @param {server.JointFacts} facts */
   take({ joints }) {
     if (joints.some(([name]) => !this.rows.has(name))) this.addRows(joints);
     for (const [name, ...values] of joints) {
@@ -91,7 +88,7 @@ export class JointsView {
 
   /**
    * Several nodes may take turns in publishing joints of their own.
-   * @param {JointRow[]} joints
+   * @param {server.JointRow[]} joints
    */
   addRows(joints) {
     for (const [name] of joints) {

@@ -8,10 +8,6 @@ import { h, replace, setText } from '../page/dom.js';
 import { RobotFeed } from './robot_feed.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
-/** @typedef {import('../drawing/types').Box} Box */
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').CloudFacts} CloudFacts */
-
 const PERIOD_MS = 150;
 const OFFER_MS = 1000; // how often it is looked for what else may be shown
 const NO_JOINTS = 'No joint states come.';
@@ -20,7 +16,7 @@ const NEAR = 1.2; // m: what of a cloud is near a robot
 /** @abstract */
 export class LiveScene {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} topic
    * @param {string} choiceLabel
    */
@@ -35,11 +31,11 @@ export class LiveScene {
     this.root = h('figure', { class: 'view cloud-view', 'data-topic': topic }, this.scene.root,
       h('figcaption', {}, h('div', { class: 'row' }, h('span', { class: 'ellipsis' }, topic),
         h('span', { class: 'spacer' }), this.count, this.choice), this.lack));
-    /** @type {SensorFeed<CloudFacts> | null} */
+    /** @type {SensorFeed<server.CloudFacts> | null} */
     this.clouds = null;
     /** @type {RobotFeed | null} */
     this.robot = null;
-    /** @type {{ layer: CloudLayer, facts: CloudFacts } | null} */
+    /** @type {{ layer: CloudLayer, facts: server.CloudFacts } | null} */
     this.cloud = null;
     this.said = { cloud: '', robot: '' }; // what the feeds say
     /** @type {string | null} */
@@ -113,7 +109,7 @@ export class LiveScene {
 
   /**
    * @param {Response} answer
-   * @param {CloudFacts} facts
+   * @param {server.CloudFacts} facts
    */
   async takeCloud(answer, facts) {
     const points = unpacked(await answer.arrayBuffer(), facts);
@@ -183,8 +179,8 @@ export class LiveScene {
 
 /**
  * The box of a robot, and of what a cloud has near it.
- * @param {Box | null} [cloud]
- * @param {Box | null} [robot]
+ * @param {drawing.Box | null} [cloud]
+ * @param {drawing.Box | null} [robot]
  */
 function around(cloud, robot) {
   if (!cloud || !robot) return cloud || robot || null;

@@ -5,12 +5,6 @@ import { vector } from '../drawing/transforms.js';
 import { counted } from '../page/format.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
-/** @typedef {import('../drawing/types').Geometry} Geometry */
-/** @typedef {import('../drawing/types').RobotModel} RobotModel */
-/** @typedef {import('../drawing/types').Vector} Vector */
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').ModelHeader} ModelHeader */
-/** @typedef {import('../server').RobotFacts} RobotFacts */
 /** @typedef {import('./sensor_feed.js').Missing} Missing */
 
 export const ROBOT = 'robot_description';
@@ -18,7 +12,7 @@ const PERIOD_MS = 120;
 
 /**
  * The robots that are known.
- * @param {App} app
+ * @param {page.App} app
  */
 export function robotsOf(app) {
   return app.store.sensors.filter((each) => each.kind === 'robot').map((each) => each.topic);
@@ -26,7 +20,7 @@ export function robotsOf(app) {
 
 /**
  * The robot that a topic belongs to: it has its namespace. '' where there is none.
- * @param {App} app
+ * @param {page.App} app
  * @param {string} topic
  */
 export function robotOf(app, topic) {
@@ -36,7 +30,7 @@ export function robotOf(app, topic) {
 
 export class RobotFeed {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} topic the parameter with its description
    * @param {Element} root nothing is asked for while it is not on the page
    * @param {{ moved: () => void, say: (text: string, missing: Missing) => void }} use moved: there
@@ -50,7 +44,7 @@ export class RobotFeed {
     this.layer = null;
     this.floor = 0; // m
     this.joints = NaN; // that are known
-    /** @type {SensorFeed<RobotFacts>} */
+    /** @type {SensorFeed<server.RobotFacts>} */
     this.feed = new SensorFeed(app, () => this.number, root,
       { every: PERIOD_MS, take: (answer, facts) => this.take(answer, facts), say });
   }
@@ -73,7 +67,7 @@ export class RobotFeed {
 
   /**
    * @param {Response} answer
-   * @param {RobotFacts} facts
+   * @param {server.RobotFacts} facts
    */
   async take(answer, facts) {
     const poses = new Float32Array(await answer.arrayBuffer());
@@ -100,11 +94,11 @@ export class RobotFeed {
 /**
  * A robot as the server sends it.
  * @param {ArrayBuffer} data
- * @returns {RobotModel}
+ * @returns {drawing.RobotModel}
  */
 function modelOf(data) {
   const length = new DataView(data).getUint32(0, true);
-  /** @type {ModelHeader} */
+  /** @type {server.ModelHeader} */
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
   let at = 4 + length;
   const geometries = header.geometries.map((geometry) => {
@@ -119,9 +113,9 @@ function modelOf(data) {
 /**
  * @param {Uint16Array} raw
  * @param {Uint16Array} triangles
- * @param {Vector} offset
- * @param {Vector} scale
- * @returns {Geometry}
+ * @param {drawing.Vector} offset
+ * @param {drawing.Vector} scale
+ * @returns {drawing.Geometry}
  */
 function geometryOf(raw, triangles, offset, scale) {
   const corners = new Float32Array(raw.length);

@@ -3,11 +3,9 @@
 import { setText } from '../page/dom.js';
 import { LiveScene } from './live_scene.js';
 
-/** @typedef {import('../page/types').App} App */
-
 export class RobotView extends LiveScene {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {string} topic
    */
   constructor(app, topic) {

@@ -3,9 +3,6 @@
 // on the screen. Images get narrower where the link is slow.
 import { LinkWidth } from './link_width.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').SensorFacts} SensorFacts */
-
 const LEAST_PAUSE_MS = 60;
 const TROUBLE_PAUSE_MS = 1000;
 const AWAY_PAUSE_MS = 250;
@@ -17,7 +14,7 @@ const REFUSALS = { 404: 'It is gone.', 429: TOO_MANY, 503: TOO_MANY };
 /**
  * The number of a sensor now; a console that was restarted gives other numbers. undefined where it
  * is gone.
- * @param {App} app
+ * @param {page.App} app
  * @param {string} topic
  * @param {string} [type]
  */
@@ -32,7 +29,7 @@ export function numberOf(app, topic, type) {
  */
 
 /**
- * @template {SensorFacts} Facts what is told beside the messages of this kind of sensor
+ * @template {server.SensorFacts} Facts what is told beside the messages of this kind of sensor
  * @typedef {object} Use
  * @property {(answer: Response, facts: Facts) => Promise<void> | void} take shows a message
  * @property {(text: string, missing: Missing) => void} say '' where all is well
@@ -42,10 +39,10 @@ export function numberOf(app, topic, type) {
  *   the sensor's place, undefined for none
  */
 
-/** @template {SensorFacts} Facts */
+/** @template {server.SensorFacts} Facts */
 export class SensorFeed {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {() => number | null | undefined} which the sensor's number; null: there is none yet,
    *   undefined: it is gone
    * @param {Element} root nothing is asked for while it is not on the page

@@ -10,12 +10,9 @@ import { CloudView } from './cloud_view.js';
 import { JointsView } from './joints_view.js';
 import { RobotView } from './robot_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Panel} Panel */
-/** @typedef {import('../server').Sensor} Sensor */
 /** @typedef {{ root: HTMLElement, stop(): void }} View */
 
-/** @type {Panel} */
+/** @type {page.Panel} */
 export const sensors = { id: 'sensors', title: 'Sensors', create: (app) => new SensorPanel(app) };
 
 const MOST_VIEWS = 4;
@@ -30,7 +27,7 @@ const CHOOSE = 'Choose up to ' + MOST_VIEWS + ' sensors. The console listens to 
   + 'while somebody looks at it.';
 
 class SensorPanel {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     /** @type {Map<string, View>} */
@@ -67,14 +64,14 @@ class SensorPanel {
 
   /**
    * @param {string} title
-   * @param {Sensor[]} found
+   * @param {server.Sensor[]} found
    */
   group(title, found) {
     return found.length > 0 && h('div', { key: title, class: 'group' },
       h('span', { class: 'robot' }, title), found.map((sensor) => this.button(sensor)));
   }
 
-  /** @param {Sensor} sensor */
+  /** @param {server.Sensor} sensor */
   button(sensor) {
     const { topic, type } = sensor;
     const name = nameOf(sensor);
@@ -83,7 +80,7 @@ class SensorPanel {
     breakable(topic.replace(/^\//, ''), '/'));
   }
 
-  /** @param {Sensor} sensor */
+  /** @param {server.Sensor} sensor */
   toggle(sensor) {
     const name = nameOf(sensor);
     if (this.wanted.includes(name)) {
@@ -96,7 +93,7 @@ class SensorPanel {
     this.showList();
   }
 
-  /** @param {Sensor} sensor */
+  /** @param {server.Sensor} sensor */
   open(sensor) {
     const { topic, type, kind } = sensor;
     const view = new VIEWS[kind](this.app, topic, type);
@@ -122,5 +119,5 @@ class SensorPanel {
   }
 }
 
-/** @param {Sensor} sensor */
+/** @param {server.Sensor} sensor */
 function nameOf({ type, topic }) { return type + ' ' + topic; }

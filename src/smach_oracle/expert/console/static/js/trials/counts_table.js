@@ -3,15 +3,13 @@
 import { h } from '../page/dom.js';
 import { duration, percent } from '../page/format.js';
 
-/** @typedef {import('../server').CountsRow} CountsRow */
-
 const OTHER_END = 'Other end'; // the outcome says neither success nor failure
 const COLUMNS = ['Experiment', 'Variant', 'Trials', 'Failures', 'Oracle recoveries', 'Questions',
   'Expert answered', 'Ended in failure', OTHER_END, 'Waited until well'];
 
 /**
  * @param {string} caption
- * @param {CountsRow[]} rows
+ * @param {server.CountsRow[]} rows
  */
 export function countsTable(caption, rows) {
   const others = rows.some(({ endings }) => endings.other);
@@ -22,7 +20,7 @@ export function countsTable(caption, rows) {
 }
 
 /**
- * @param {CountsRow} row
+ * @param {server.CountsRow} row
  * @param {boolean} others whether there is a column of other ends
  */
 function rowOf(row, others) {

@@ -4,8 +4,6 @@ import { h, replace } from '../page/dom.js';
 import { added } from '../page/format.js';
 import { whenLetGo } from '../page/redraw.js';
 
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-
 const MOST_SHOWN = 600;
 
 export class EventLog {
@@ -24,10 +22,10 @@ export class EventLog {
     replace(this.root);
   }
 
-  /** @param {() => TrialEvent[]} eventsNow of the trial, so far */
+  /** @param {() => server.TrialEvent[]} eventsNow of the trial, so far */
   show(eventsNow) { whenLetGo(this.root, () => this.add(eventsNow())); }
 
-  /** @param {TrialEvent[]} events */
+  /** @param {server.TrialEvent[]} events */
   add(events) {
     const fresh = events.slice(this.shown);
     this.shown = events.length;
@@ -36,7 +34,7 @@ export class EventLog {
   }
 
   /**
-   * @param {TrialEvent} event
+   * @param {server.TrialEvent} event
    * @param {number} begin of the trial
    */
   row(event, begin) {

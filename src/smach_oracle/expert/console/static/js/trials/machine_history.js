@@ -1,15 +1,9 @@
 // @ts-check
 // The state of a machine at a moment of a trial, derived from the trial's events alone. Pure.
 
-/** @typedef {import('../robots/types').MachineState} MachineState */
-/** @typedef {import('../server').EventName} EventKind */
-/** @typedef {import('../server').TransitionCount} TransitionCount */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-/** @typedef {import('./types').Snapshot} Snapshot */
-
 /**
  * Events that are worth a stop: page keys go from one to the next.
- * @type {Set<EventKind>}
+ * @type {Set<server.EventName>}
  */
 const LANDMARKS = new Set(['trial_start', 'failure', 'query_opened', 'query_answered', 'give_up',
   'supersede', 'trial_end']);
@@ -18,13 +12,13 @@ const DEEPEST = 50;
 
 export class MachineHistory {
   constructor() {
-    /** @type {TrialEvent[]} */
+    /** @type {server.TrialEvent[]} */
     this.events = [];
     this.index = -1; // of the last event that `now` knows of
     this.now = beginning();
   }
 
-  /** @param {TrialEvent[]} events */
+  /** @param {server.TrialEvent[]} events */
   set(events) {
     if (events.length < this.events.length || events[0] !== this.events[0]) this.clear();
     this.events = events;
@@ -80,14 +74,14 @@ export class MachineHistory {
   }
 }
 
-/** @returns {Snapshot} */
+/** @returns {replay.Snapshot} */
 function beginning() {
   return { active: {}, asked: {}, latest: {}, failed: {}, rates: {}, taken: {}, question: null };
 }
 
 /**
- * @param {Snapshot} now
- * @param {TrialEvent} event
+ * @param {replay.Snapshot} now
+ * @param {server.TrialEvent} event
  */
 function take(now, event) {
   const { kind, path, state, target } = event;
@@ -112,8 +106,8 @@ function take(now, event) {
 }
 
 /**
- * @param {Snapshot} now
- * @param {TrialEvent} event
+ * @param {replay.Snapshot} now
+ * @param {server.TrialEvent} event
  */
 function takeTransition(now, { path, state, outcome, target, counted }) {
   count(now, path, state, outcome, target);
@@ -124,8 +118,8 @@ function takeTransition(now, { path, state, outcome, target, counted }) {
 }
 
 /**
- * @param {Snapshot} now
- * @param {TrialEvent} event
+ * @param {replay.Snapshot} now
+ * @param {server.TrialEvent} event
  */
 function takeFailure(now, { path, state, rate, class: rank }) {
   const learned = rateOf(now, path, state);
@@ -139,8 +133,8 @@ function takeFailure(now, { path, state, rate, class: rank }) {
 }
 
 /**
- * @param {Snapshot} now
- * @param {TrialEvent} event
+ * @param {replay.Snapshot} now
+ * @param {server.TrialEvent} event
  */
 function takeQuestion(now, event) {
   const { kind, query, state, text, by } = event;
@@ -158,7 +152,7 @@ function takeQuestion(now, event) {
 }
 
 /**
- * @param {Snapshot} now
+ * @param {replay.Snapshot} now
  * @param {string} path
  */
 function leaveOracle(now, path) {
@@ -167,7 +161,7 @@ function leaveOracle(now, path) {
 }
 
 /**
- * @param {Snapshot} now
+ * @param {replay.Snapshot} now
  * @param {string} path
  * @param {string | null} from null: the oracle
  * @param {string} outcome
@@ -183,7 +177,7 @@ function count(now, path, from, outcome, to) {
 
 /**
  * What is learned of a state, to be changed.
- * @param {Snapshot} now
+ * @param {replay.Snapshot} now
  * @param {string} path
  * @param {string} state
  */
@@ -197,19 +191,19 @@ function rateOf(now, path, state) {
 
 /**
  * As machine_view.js shows it.
- * @param {Snapshot} now
+ * @param {replay.Snapshot} now
  * @param {string[]} paths
  * @param {(path: string) => string} oracleOf the label of a container's meta state
- * @returns {MachineState}
+ * @returns {machine.MachineState}
  */
 export function machineStateOf(now, paths, oracleOf) {
-  /** @type {MachineState['active']} */
+  /** @type {machine.MachineState['active']} */
   const active = {};
   for (const path of paths) {
     const label = now.active[path] || (now.asked[path] ? oracleOf(path) : '');
     active[path] = label ? [label] : [];
   }
-  /** @type {MachineState['counts']} */
+  /** @type {machine.MachineState['counts']} */
   const counts = {};
   for (const path of Object.keys(now.taken)) counts[path] = countsOf(now, path, oracleOf(path));
   const { latest, failed, rates } = now;
@@ -217,10 +211,10 @@ export function machineStateOf(now, paths, oracleOf) {
 }
 
 /**
- * @param {Snapshot} now
+ * @param {replay.Snapshot} now
  * @param {string} path
  * @param {string} oracle
- * @returns {TransitionCount[]}
+ * @returns {server.TransitionCount[]}
  */
 function countsOf(now, path, oracle) {
   const taken = [...(now.taken[path] || new Map()).values()];
@@ -233,7 +227,7 @@ function countsOf(now, path, oracle) {
 
 /**
  * From the top machine down to the state that runs or has failed: path of its container, and label.
- * @param {Snapshot} now
+ * @param {replay.Snapshot} now
  */
 export function activePath(now) {
   /** @type {[path: string, label: string][]} */

@@ -5,21 +5,17 @@ import { h } from '../page/dom.js';
 import { counted } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').BagOverview} BagOverview */
-/** @typedef {import('../server').RecordedTrial} RecordedTrial */
-
 const LOST = 'The connection was lost; choose the trial again.';
 
 export class RecordedTrials {
   /**
-   * @param {App} app
+   * @param {page.App} app
    * @param {() => void} onOpen what was opened is there, or cannot be had
    */
   constructor(app, onOpen) {
     this.app = app;
     this.onOpen = onOpen;
-    /** @type {(RecordedTrial & { number: number }) | null} */
+    /** @type {(server.RecordedTrial & { number: number }) | null} */
     this.opened = null;
     this.problem = '';
     this.wanted = -1; // number of the trial that is being opened
@@ -78,7 +74,7 @@ export class RecordedTrials {
   }
 }
 
-/** @param {BagOverview['broken']} broken */
+/** @param {server.BagOverview['broken']} broken */
 function brokenBags(broken) {
   return h('details', { class: 'broken-bags' },
     h('summary', {}, counted(broken.length, 'bag') + ' could not be read'),

@@ -4,24 +4,20 @@ import { h, replace } from '../page/dom.js';
 import { chip } from '../page/format.js';
 import { FailureImageView } from '../sensors/failure_image_view.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../server').KeptImage} KeptImage */
-/** @typedef {import('./types').AskedQuestion} AskedQuestion */
-
 export class ReplayQuestion {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.root = h('div', { class: 'replay-question', hidden: true });
     this.key = 'null'; // of what is shown
-    /** @type {KeptImage[]} */
+    /** @type {server.KeptImage[]} */
     this.images = [];
     this.imagesRoot = h('div', { class: 'replay-images' });
   }
 
   /**
-   * @param {AskedQuestion | null} question
-   * @param {KeptImage[]} images
+   * @param {replay.AskedQuestion | null} question
+   * @param {server.KeptImage[]} images
    */
   show(question, images) {
     const key = JSON.stringify(question);
@@ -39,7 +35,7 @@ export class ReplayQuestion {
 
   /**
    * They are asked for once.
-   * @param {KeptImage[]} images
+   * @param {server.KeptImage[]} images
    */
   showImages(images) {
     if (!images.length) return null;
@@ -51,7 +47,7 @@ export class ReplayQuestion {
   }
 }
 
-/** @param {AskedQuestion} question */
+/** @param {replay.AskedQuestion} question */
 function answerOf({ answer, closed }) {
   if (!answer) {
     return h('p', { class: 'dim' }, closed ? 'No answer: ' + closed + '.' : 'Not answered yet.');

@@ -1,13 +1,9 @@
 // @ts-check
 // What is on the time axis of a trial: lanes, bars, marks and ticks. Pure.
 
-/** @typedef {import('../server').EventName} EventKind */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-/** @typedef {import('./types').Bar} Bar */
-
 /**
  * Events that are marked, and how.
- * @type {{ [kind in EventKind]?: string }}
+ * @type {{ [kind in server.EventName]?: string }}
  */
 export const MARKS = { failure: 'bad', decision: 'oracle', jump: 'oracle', supersede: 'expert',
   give_up: 'bad', warning: 'warn', query_opened: 'expert', query_claimed: 'expert',
@@ -18,7 +14,7 @@ const STEPS_S = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 
   3600];
 const MOST_TICKS = 8;
 
-/** @param {TrialEvent} event */
+/** @param {server.TrialEvent} event */
 export function laneOf({ kind, path, state }) {
   const asked = kind.startsWith('query') || kind.startsWith('interface');
   if (asked || kind === 'supersede') return 'expert';
@@ -28,7 +24,7 @@ export function laneOf({ kind, path, state }) {
 
 /**
  * In the order of their first event; oracle and expert at the end.
- * @param {TrialEvent[]} events
+ * @param {server.TrialEvent[]} events
  */
 export function lanesOf(events) {
   /** @type {Set<string>} */
@@ -43,11 +39,11 @@ export function lanesOf(events) {
 
 /**
  * Of states, from start to end.
- * @param {TrialEvent[]} events
+ * @param {server.TrialEvent[]} events
  * @param {number} end of the axis
  */
 export function stateBars(events, end) {
-  /** @type {Bar[]} */
+  /** @type {replay.Bar[]} */
   const bars = [];
   /** @type {Map<string, number>} */
   const running = new Map(); // by lane, since when
@@ -71,16 +67,16 @@ export function stateBars(events, end) {
 
 /**
  * Of questions, from when they were asked.
- * @param {TrialEvent[]} events
+ * @param {server.TrialEvent[]} events
  * @param {number} end of the axis
  */
 export function questionBars(events, end) {
-  /** @type {Bar[]} */
+  /** @type {replay.Bar[]} */
   const bars = [];
-  /** @type {TrialEvent | null} */
+  /** @type {server.TrialEvent | null} */
   let asked = null;
   /**
-   * @param {TrialEvent} question
+   * @param {server.TrialEvent} question
    * @param {number} to
    * @param {string} kind
    */

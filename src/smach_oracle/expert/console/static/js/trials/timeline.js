@@ -6,9 +6,6 @@ import { duration } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { MARKS, laneOf, lanesOf, questionBars, stateBars, ticks } from './time_axis.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-/** @typedef {import('./types').Bar} Bar */
 /** @typedef {{ left: number, right: number, begin: number, whole: number }} Scale px and s */
 /** @typedef {{ from: number, to: number }} Part of the axis, s since the epoch */
 /**
@@ -40,7 +37,7 @@ export class Timeline {
       'aria-label': 'Time in the trial', 'aria-valuemin': 0, onkeydown: onKey },
     this.axis, this.handle);
     this.root = h('div', { class: 'timeline' }, this.slider, this.canvas);
-    /** @type {TrialEvent[]} */
+    /** @type {server.TrialEvent[]} */
     this.events = [];
     this.end = 0;
     /** @type {Scale | null} */
@@ -156,7 +153,7 @@ export class Timeline {
   }
 
   /**
-   * @param {TrialEvent[]} events
+   * @param {server.TrialEvent[]} events
    * @param {number} end of the axis
    */
   set(events, end) {
@@ -263,7 +260,7 @@ export class Timeline {
     this.events.filter(({ t }) => this.isShown(t, t)).map((event) => this.drawMark(event)));
   }
 
-  /** @param {Bar} bar */
+  /** @param {replay.Bar} bar */
   drawBar({ lane, from, to, kind, words }) {
     const [x, end] = [this.x(from), this.x(to)];
     return svg('rect', { class: 'bar ' + kind, x, y: this.y(lane) + 4, rx: 3, height: LANE - 8,
@@ -271,8 +268,8 @@ export class Timeline {
   }
 
   /**
-   * @param {TrialEvent} event
-   * @returns {Child}
+   * @param {server.TrialEvent} event
+   * @returns {page.Child}
    */
   drawMark(event) {
     const { kind, seq, t, words } = event;

@@ -4,13 +4,11 @@ import { h } from '../page/dom.js';
 import { chip, clock, counted, duration } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 
-/** @typedef {import('../page/types').Child} Child */
-/** @typedef {import('../server').Trial} Trial */
-
-/** @type {{ [ending in Trial['ending']]: string }} */
+/** @type {{ [ending in server.Trial['ending']]: string }} */
 const ENDINGS = { success: 'good', failure: 'bad', other: 'warn', preempted: 'warn',
   unfinished: 'warn', '': 'accent' };
-/** @type {{ [name: string]: { title: string, fits: (trial: Trial) => boolean } | undefined }} */
+/** @typedef {{ title: string, fits: (trial: server.Trial) => boolean }} TrialFilter */
+/** @type {{ [name: string]: TrialFilter | undefined }} */
 const FILTERS = {
   all: { title: 'All trials', fits: () => true },
   failed: { title: 'With failures', fits: (trial) => trial.failures > 0 },
@@ -19,15 +17,15 @@ const FILTERS = {
     fits: ({ ending }) => Boolean(ending) && ending !== 'success' },
 };
 
-/** @param {Trial} trial */
+/** @param {server.Trial} trial */
 export function isOfBag(trial) { return trial.number !== undefined; }
 
-/** @param {Trial} trial */
+/** @param {server.Trial} trial */
 export function isRunning(trial) { return !isOfBag(trial) && !trial.ending && !trial.outcome; }
 
 /**
  * How long it took, and what happened in it.
- * @param {Trial} trial
+ * @param {server.Trial} trial
  * @param {number} [now] by the server's clock; without it nothing is said of how long a trial has
  *   run that has not ended
  */
@@ -58,7 +56,7 @@ export class TrialList {
   }
 
   /**
-   * @param {Trial[]} all
+   * @param {server.Trial[]} all
    * @param {string} chosen
    */
   show(all, chosen) {
@@ -75,7 +73,7 @@ export class TrialList {
   }
 
   /**
-   * @param {Trial} trial
+   * @param {server.Trial} trial
    * @param {string} chosen
    */
   row(trial, chosen) {
@@ -91,10 +89,10 @@ export class TrialList {
 }
 
 /**
- * @param {Trial[]} trials newest first
+ * @param {server.Trial[]} trials newest first
  */
 function groupedByDay(trials) {
-  /** @type {{ day: string, trials: Trial[] }[]} */
+  /** @type {{ day: string, trials: server.Trial[] }[]} */
   const found = [];
   for (const trial of trials) {
     const day = new Date(trial.start * 1000).toLocaleDateString();

@@ -10,13 +10,7 @@ import { RecordedTrials } from './recorded_trials.js';
 import { TrialList, isOfBag, isRunning, summaryOf } from './trial_list.js';
 import { TrialReplay } from './trial_replay.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../page/types').Panel} Panel */
-/** @typedef {import('../server').EventSlice} EventSlice */
-/** @typedef {import('../server').Trial} Trial */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-
-/** @type {Panel} */
+/** @type {page.Panel} */
 export const trials = { id: 'trials', title: 'Trials', create: (app) => new TrialPanel(app) };
 
 const NARROW = '(max-width: 960px)';
@@ -26,24 +20,24 @@ const COUNTED = ': in how many each happened at least once';
 const HEARD = 'Trials that ended while this console watched' + COUNTED;
 const IN_BAGS = 'Trials in the bags' + COUNTED;
 
-/** @param {Trial} trial */
+/** @param {server.Trial} trial */
 function lostEvents(trial) {
   const { lost } = trial;
   return isOfBag(trial) ? lost + ' events missing' : lost + ' events were not heard';
 }
 
 class TrialPanel {
-  /** @param {App} app */
+  /** @param {page.App} app */
   constructor(app) {
     this.app = app;
     this.chosen = ''; // id of the trial that is shown
-    /** @type {Trial | null} */
+    /** @type {server.Trial | null} */
     this.bag = null; // the trial that is shown, if it is one of a bag
-    /** @type {Trial | null} */
+    /** @type {server.Trial | null} */
     this.trial = null;
     this.wanted = ''; // id of the trial that an address names, until it is found
     this.follows = true; // the newest trial is shown, until a person chooses
-    /** @type {TrialEvent[]} */
+    /** @type {server.TrialEvent[]} */
     this.events = [];
     this.tableKey = ''; // of what it shows
     this.table = h('div', { class: 'table-frame card trial-counts' });
@@ -91,7 +85,7 @@ class TrialPanel {
     if (matchMedia(NARROW).matches) this.detail.scrollIntoView();
   }
 
-  /** @param {Trial} trial */
+  /** @param {server.Trial} trial */
   open(trial) {
     if (trial.number === undefined) {
       this.watch(trial.id);
@@ -103,7 +97,7 @@ class TrialPanel {
 
   /**
    * @param {string} id
-   * @param {Trial | null} bag
+   * @param {server.Trial | null} bag
    */
   begin(id, bag) {
     this.chosen = id;
@@ -130,7 +124,7 @@ class TrialPanel {
     this.showEvents();
   }
 
-  /** @param {EventSlice} slice */
+  /** @param {server.EventSlice} slice */
   take({ trial, from, events }) {
     if (this.bag || trial !== this.chosen || from > this.events.length) return;
     this.events = this.events.slice(0, from).concat(events);
@@ -166,7 +160,7 @@ class TrialPanel {
 
   /**
    * Turn to the newest trial where the chosen one is gone, or none was chosen.
-   * @param {Trial[]} all
+   * @param {server.Trial[]} all
    */
   settle(all) {
     const named = all.find(({ id }) => id === this.wanted);
@@ -195,7 +189,7 @@ class TrialPanel {
       bags.length > 0 && countsTable(IN_BAGS, bags));
   }
 
-  /** @param {Trial} trial */
+  /** @param {server.Trial} trial */
   showFacts(trial) {
     this.trial = trial;
     const { experiment, start, lost, nth, detailed, bag } = trial;
@@ -220,8 +214,8 @@ class TrialPanel {
 
   /**
    * What is beside the events of a trial.
-   * @param {Trial} trial
-   * @returns {Pick<import('./types').ReplayedTrial, 'graph' | 'images'>}
+   * @param {server.Trial} trial
+   * @returns {Pick<replay.ReplayedTrial, 'graph' | 'images'>}
    */
   recording({ robot }) {
     const { store } = this.app;

@@ -9,22 +9,16 @@ import { ReplayControls } from './replay_controls.js';
 import { ReplayQuestion } from './replay_question.js';
 import { Timeline } from './timeline.js';
 
-/** @typedef {import('../page/types').App} App */
-/** @typedef {import('../robots/types').MachineSource} MachineSource */
-/** @typedef {import('../robots/types').MachineState} MachineState */
-/** @typedef {import('../server').TrialEvent} TrialEvent */
-/** @typedef {import('./types').ReplayedTrial} ReplayedTrial */
-/** @typedef {import('./types').Snapshot} Snapshot */
-
 const ROBOT = 'replayed'; // stands for the trial's robot in the ids of its states
 const FOLLOW = 'follow what is active';
-/** @type {ReplayedTrial} */
+/** @type {replay.ReplayedTrial} */
 const NOTHING = { id: '', events: [], end: 0, running: false, graph: () => undefined, images: {} };
 
 export class TrialReplay {
   /**
-   * @param {App} app
-   * @param {(event: TrialEvent) => void} onCursor the event under the cursor is another one now
+   * @param {page.App} app
+   * @param {(event: server.TrialEvent) => void} onCursor the event under the cursor is another
+   *   one now
    */
   constructor(app, onCursor) {
     this.onCursor = onCursor;
@@ -37,14 +31,14 @@ export class TrialReplay {
     this.index = -1; // of the event under the cursor
     this.shown = ''; // which one is shown
     this.chosen = ''; // path of a container
-    /** @type {MachineState} */
+    /** @type {machine.MachineState} */
     this.state = { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
     this.timeline = new Timeline({ onSeek: (t) => this.seek(t), onPick: (seq) => this.pick(seq),
       onKey: (event) => this.key(event) });
     this.controls = new ReplayControls({ first: () => this.to(0), back: () => this.step(-1),
       play: () => this.toggle(), forward: () => this.step(1), last: () => this.to(this.last),
       follow: () => this.follow(true), zoom: (factor) => this.timeline.zoom(factor) });
-    /** @type {MachineSource} */
+    /** @type {machine.MachineSource} */
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
     this.view = new MachineView(source, (path) => this.open(path));
     this.path = h('div', { class: 'chips replay-path', 'aria-label': 'What is active' });
@@ -64,7 +58,7 @@ export class TrialReplay {
   /** Index of the last event. */
   get last() { return this.trial.events.length - 1; }
 
-  /** @param {ReplayedTrial} trial another one begins at its start */
+  /** @param {replay.ReplayedTrial} trial another one begins at its start */
   set(trial) {
     const another = trial.id !== this.trial.id;
     this.trial = trial;
@@ -164,7 +158,7 @@ export class TrialReplay {
 
   /**
    * @param {[path: string, label: string][]} active
-   * @param {Snapshot} now
+   * @param {replay.Snapshot} now
    */
   showPath(active, { failed }) {
     const key = JSON.stringify([active, failed]);
@@ -268,7 +262,7 @@ export class TrialReplay {
   }
 }
 
-/** @param {TrialEvent} event */
+/** @param {server.TrialEvent} event */
 function wordsOf(event) {
   return (event.words || event.kind) + (event.kind === 'failure' ? added(event) : '');
 }

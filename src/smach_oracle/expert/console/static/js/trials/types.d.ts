@@ -2,6 +2,8 @@
 import { ByPath, ByState, Graph, KeptImage, TrialEvent } from '../server';
 import { ShownRate } from '../robots/types';
 
+export as namespace replay;
+
 /** What is replayed. */
 export interface ReplayedTrial {
   id: string;
