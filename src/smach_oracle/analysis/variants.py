@@ -208,11 +208,11 @@ def count_variant(variant: VariantTrials) -> VariantCounts:
     trials, parts = variant.trials, variant.replicates()
     known = [trial for trial in trials if trial.truth is not None]
     counts = [_by_events(name, number, trials, parts) for name, number in _BY_EVENTS]
-    counts += [
-        make_count(name, _ended(ending), trials, parts)
-        for ending, name in _ENDINGS.items()
-        if ending is not TrialEnding.OTHER or any(map(_ended(ending), trials))
-    ]
+    ended = [[trial.ending for trial in part] for part in parts]
+    for ending, name in _ENDINGS.items():
+        by_part = [part.count(ending) for part in ended]
+        if ending is not TrialEnding.OTHER or any(by_part):
+            counts.append(_count(name, by_part, trials, parts))
     if known:
         counts += [
             make_count(name, _found(holds), known, _by_replicate(known))
@@ -245,10 +245,6 @@ def _by_events(
     numbers = [list(map(number, part)) for part in parts]
     count = _count(name, [len(part) - part.count(0) for part in numbers], trials, parts)
     return count._replace(events=sum(sum(part) for part in numbers))
-
-
-def _ended(ending: TrialEnding) -> Callable[[TrialSummary], bool]:
-    return lambda trial: trial.ending is ending
 
 
 def _found(holds: Callable[[TrialEnding, bool], bool]) -> Callable[[TrialSummary], bool]:
