@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """How long it takes to count bags, beside rosbag's Python API, which everybody has.
 
-    python3 benchmarks/count_bags.py [--bags N ...] [--images N] [--folder F] [--rounds N] [--check]
+    python3 benchmarks/count_bags.py [--bags N ...] [--images N] [--replay N] [--folder F]
+                                     [--rounds N] [--check]
 
 `bag_statistics` and a script of a few lines that reads the same events by rosbag count the same
 bags, each in a process of its own on one core, in turns. Shown are processor seconds, the least of
@@ -12,8 +13,9 @@ from those of two cores. Of two cores the processor seconds of the process that 
 compared: that is the time that the count takes where both cores are free. The seconds of the clock
 mean something on an idle machine. Next to the events a bag has what oracle_run records with them:
 rates, and structure and status of two containers. With --images each trial begins and ends with so
-many images. With --folder the bags of a folder are counted. With --check 300 and 1,000 bags are
-counted, and the exit status is 1 where a limit is missed. Needs no ROS master.
+many images. With --replay a replay of so many small images lies behind each failure. With --folder
+the bags of a folder are counted. With --check 300 and 1,000 bags are counted, and the exit status
+is 1 where a limit is missed. Needs no ROS master.
 """
 
 import argparse
@@ -28,11 +30,12 @@ from typing import Any, Dict, List, NamedTuple, Tuple
 
 import rosbag
 from quiet import silence
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CompressedImage, Image
 
 from smach_msgs.msg import SmachContainerStatus, SmachContainerStructure
-from smach_oracle.msg import OracleRates, StateRate
+from smach_oracle.msg import FailureReplay, OracleRates, StateRate
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.ros.recorder import TrialRecorder
 
 CHECKED, KEPT = 300, 1000  # bags. So many that their counts are kept
@@ -42,6 +45,7 @@ LEAST_RATIO, LEAST_RATIO_OF_KEPT = 2.8, 2.2
 MOST_AGAIN = 0.2  # of the seconds of the first count, both without the start. The aim is 0.1
 EVENTS = '/oracle/events'  # end of the name of a topic
 SETTLED_S = 2.1
+JPEG_BYTES = 12000  # of 320 x 240 pixels, as cameras give them
 PIXELS = 640 * 480 * 3
 OURS = """
 import sys
@@ -82,7 +86,7 @@ class Taken(NamedTuple):
     peak_mb: float
 
 
-def record(folder: Path, bags: int, images: int) -> None:
+def record(folder: Path, bags: int, images: int, replay: int) -> None:
     """Record trials of a machine of nine states, one of which fails at first in every other."""
     smach = silence()
     trial = {'number': 0, 'tries': 0}
@@ -116,6 +120,14 @@ def record(folder: Path, bags: int, images: int) -> None:
         container.events,
         {topic: functools.partial(_same, message) for topic, message in others.items()},
     )
+    jpegs = [CompressedImage(format='jpeg', data=bytes(JPEG_BYTES))] * replay
+
+    def put_replay(event: Event) -> None:
+        if replay and event.kind == EventKind.FAILURE:
+            message = FailureReplay(trial_id=event.trial_id, seq=event.seq, images=jpegs)
+            recorder.put(event.trial_id, '/failure_replay', message)
+
+    container.events.observers.append(put_replay)
     for number in range(bags):
         trial.update(number=number, tries=0)
         machine.execute()
@@ -149,10 +161,10 @@ def take(program: str, *args: str, cache: str = '', cores: int = 1) -> Taken:
     return Taken(used.ru_utime + used.ru_stime, own_s, wall_s, peak_kb / 1024.0)
 
 
-def measure(bags: int, images: int, rounds: int) -> Tuple[float, float]:
+def measure(bags: int, images: int, replay: int, rounds: int) -> Tuple[float, float]:
     """Record so many bags and count them. Return what `compare` does."""
     with tempfile.TemporaryDirectory() as name:
-        record(Path(name), bags, images)
+        record(Path(name), bags, images, replay)
         return compare(Path(name), rounds)
 
 
@@ -213,20 +225,23 @@ def main() -> int:
         '--bags', type=int, nargs='+', default=[300, 1000, 3000], help='(default: 300 1000 3000)'
     )
     parser.add_argument('--images', type=int, default=0, help='of each trial (default: none)')
+    parser.add_argument(
+        '--replay', type=int, default=0, help='images behind each failure (default: none)'
+    )
     parser.add_argument('--folder', type=Path, help='count the bags in this folder, and make none')
     parser.add_argument('--rounds', type=int, default=3, help='(default: %(default)s)')
     parser.add_argument('--check', action='store_true', help='{} bags, and a limit'.format(CHECKED))
     options = parser.parse_args()
     if options.check:
-        ratio, _ = measure(CHECKED, 0, options.rounds)
-        ratio_of_kept, share = measure(KEPT, 0, options.rounds)
+        ratio, _ = measure(CHECKED, 0, 0, options.rounds)
+        ratio_of_kept, share = measure(KEPT, 0, 0, options.rounds)
         is_fast = ratio >= LEAST_RATIO and ratio_of_kept >= LEAST_RATIO_OF_KEPT
         return 0 if is_fast and share <= MOST_AGAIN else 1
     if options.folder:
         compare(options.folder, options.rounds)
         return 0
     for bags in options.bags:
-        measure(bags, options.images, options.rounds)
+        measure(bags, options.images, options.replay, options.rounds)
     return 0
 
 

@@ -31,7 +31,13 @@ import smach
 from smach_common.introspection.container_watch import CALLBACK_LISTS, is_watched
 from smach_common.introspection.introspection_server import IntrospectionServer
 from smach_oracle.forking import in_child
-from smach_oracle.msg import ConsoleCommand, FailureFrames, InterfaceOutput, OracleRates
+from smach_oracle.msg import (
+    ConsoleCommand,
+    FailureFrames,
+    FailureReplay,
+    InterfaceOutput,
+    OracleRates,
+)
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.identity import WeakIdentityMap, own_mark, remove_identical
 from smach_oracle.oracle.scope.scope import Waiting
@@ -51,6 +57,7 @@ from .parameters import private_flag, private_names, private_number, private_tex
 from .publishers import EventPublisher, RatesPublisher, rates_of
 from .recorder import TrialRecorder, prepare_folder
 from .recording.recorder_topics import MessageClass, action_topics, audit_topic, smach_topics
+from .replay.failure_replays import FailureReplays, replays_of_node
 from .shutdown import ShutdownGuard
 from .signals.latch import start_thread
 from .stored import prepare_store
@@ -106,6 +113,7 @@ class Attachments:
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
+        self._replays: Optional[FailureReplays] = None
         self._node_started = False
         # of the work of all trials, under simulated time
         self.work_clock: Optional[WorkClock] = None
@@ -124,7 +132,7 @@ class Attachments:
         self._introspection.clear()
         self._shown.clear()
         self._expert = self._events = self._rates = self._told_trials = None
-        self._hand = self._diagnostics = None
+        self._hand = self._diagnostics = self._replays = None
         self._node_started, self.work_clock = False, None
         self.has_parents_node = rospy.core.is_initialized()
         leave_node_to_parent()
@@ -191,6 +199,8 @@ class Attachments:
                 self._on_ros[machine] = True
             # last: topics that are there already are recorded from the first trial on
             self._record(machine, plan)
+            if self._replays is not None:
+                self._replays.watch(oracle_of(machine).events)  # behind the recorder
 
     def detach(self, machine: OracleContainer) -> None:
         """Let go of a top-level machine that has ended and is about to come out of its oracle.
@@ -241,6 +251,7 @@ class Attachments:
         self._rates = RatesPublisher()
         self._told_trials = TrialsPublisher()
         self._hand = HandServer()
+        self._replays = replays_of_node(self._put_into_bag)
         if private_flag('diagnostics', True):
             self._diagnostics = DiagnosticsPublisher(
                 rospy.resolve_name(private_text('expert_query_server') or OWN_SERVER)
@@ -336,6 +347,10 @@ class Attachments:
             self._recorder.attach(
                 oracle_of(machine).events, {'~oracle/rates': _snapshot_of_rates(machine)}
             )
+
+    def _put_into_bag(self, trial_id: str, topic: str, message: FailureReplay) -> None:
+        if self._recorder is not None:
+            self._recorder.put(trial_id, topic, message)
 
     def _on_shutdown(self) -> None:
         """rospy's shutdown hook, often run inside a signal handler in the machine's own thread.

@@ -164,6 +164,13 @@ class TrialRecorder(OwnObserver):
         if event.kind == EventKind.TRIAL_END:
             self._last_end = item.when.monotonic
 
+    def put(self, trial_id: str, topic: str, message: genpy.Message) -> None:
+        """Put a message into the bag of one trial that runs. It waits as events do.
+
+        :param topic: resolved.
+        """
+        self._put_snapshot(trial_id, topic, message)
+
     def _put_snapshot(self, trial_id: str, topic: str, message: genpy.Message) -> None:
         self._queue.put_event(SnapshotItem(trial_id, topic, message, now()), self._may_wait)
 

@@ -5,28 +5,23 @@ of it is waited for.
 """
 
 import threading
-from typing import Dict, List, Sequence, Tuple, Union
+from typing import Dict, List, Sequence, Tuple
 
-import rosgraph
 import rospy
 from sensor_msgs.msg import CompressedImage, Image
 
 from smach_oracle.msg import FailureFrames
 from smach_oracle.oracle.asking.question import Question
-from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings import checks
 
 from ..connections import quiet_at_shutdown
 from ..log.said_once import warn_once
+from ..replay.known_topics import KnownTopics
+from ..replay.replay_settings import CAMERA_TYPES, camera_topics
+from ..replay.small_images import CameraMessage
 
 TOPIC = '~failure_frames'
-PARAMETER = '~failure_cameras'
-MOST_CAMERAS = 4
 JPEG_QUALITY = 85
 OLDEST_S = 10.0  # ROS time: an older image does not show the failure
-LOOK_AGAIN_S = 1.0  # for the types of topics that nobody has advertised yet
-CameraMessage = Union[Image, CompressedImage]
-_TYPES = {Image._type: Image, CompressedImage._type: CompressedImage}
 
 
 class FailureCameras:
@@ -37,17 +32,12 @@ class FailureCameras:
 
         :raises SettingsError: where they are no names of topics, or more.
         """
-        key = 'parameter ' + rospy.resolve_name(PARAMETER)
-        if len(checks.words(key, topics)) > MOST_CAMERAS:
-            raise SettingsError(key, topics, 'at most {} names of topics'.format(MOST_CAMERAS))
-        self._topics = [rospy.resolve_name(topic) for topic in topics]
+        self._topics = camera_topics(topics)
         self._newest: Dict[str, Tuple[CameraMessage, rospy.Time]] = {}  # and when it came
-        self._stopped = threading.Event()
-        self._subscribers: Dict[str, rospy.Subscriber] = {}
         self._lock = threading.Lock()
         if self._topics:
             self._publisher = rospy.Publisher(TOPIC, FailureFrames, latch=True, queue_size=5)
-            threading.Thread(target=self._listen, name='failure cameras', daemon=True).start()
+        self._listening = KnownTopics(self._topics, CAMERA_TYPES, self._keep, 'failure cameras')
 
     def publish_for(self, question: Question) -> None:
         """Publish the newest images, in a thread of its own.
@@ -71,32 +61,7 @@ class FailureCameras:
 
     def stop(self) -> None:
         """Listen no longer."""
-        self._stopped.set()
-        for subscriber in list(self._subscribers.values()):
-            subscriber.unregister()
-
-    def _listen(self) -> None:
-        """Subscribe to each as soon as its type is known."""
-        while (
-            len(self._subscribers) < len(self._topics)
-            and not rospy.is_shutdown()
-            and not self._stopped.is_set()
-        ):
-            try:
-                types = dict(rosgraph.Master(rospy.get_name()).getTopicTypes())
-            except (OSError, rosgraph.MasterException):
-                types = {}
-            for topic in self._topics:
-                if topic not in self._subscribers and types.get(topic) in _TYPES:
-                    self._subscribers[topic] = rospy.Subscriber(
-                        topic,
-                        _TYPES[types[topic]],
-                        self._keep,
-                        callback_args=topic,
-                        queue_size=1,
-                        buff_size=1 << 24,
-                    )
-            self._stopped.wait(LOOK_AGAIN_S)
+        self._listening.stop()
 
     def _keep(self, image: CameraMessage, topic: str) -> None:
         with self._lock:
