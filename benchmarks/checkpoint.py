@@ -161,7 +161,7 @@ def measure(
     with machine:
         smach.StateMachine.add('A', Writing(clock), {'again': 'B'})
         smach.StateMachine.add('B', Writing(clock), {'again': 'A'})
-    settings = {} if store is None else {'checkpoint': store, 'checkpoint_synchronous': synchronous}
+    settings = {} if store is None else {'checkpoint': {'file': store, 'synchronous': synchronous}}
     OracleContainer.wrap(machine, settings=settings)
     node = marked_node(machine)
     for label in node.labels():

@@ -42,7 +42,7 @@ def main():
     with Processes() as processes:
         processes.start_master()
         rospy.init_node('console_growth', disable_signals=True, log_level=rospy.WARN)
-        rospy.set_param('/alpha/oracle', {'deadline_s': 7200.0})  # it is one question
+        rospy.set_param('/alpha/oracle', {'expert': {'deadline_s': 7200.0}})  # it is one question
         try:
             GrowthPage.begin('console_robot.py', 'PICK', '0.05', '0', '1')
             GrowthPage.browser.find('.question-row.pending')

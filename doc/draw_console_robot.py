@@ -43,20 +43,22 @@ def main():
         settings={
             'high_from': 0.1,
             'moderate_from': 0.05,
-            'deadline_s': 900.0,
-            'escalate': False,
-            'interfaces': {
-                'perception': {
-                    'action': '/perception_interface',
-                    'states': ['DETECT_TABLETOP'],
-                    'description': 'Mark the object in the camera frame',
-                },
-                'manipulation': {
-                    'action': '/manipulation_interface',
-                    'states': ['PICK'],
-                    'description': 'Drive the hand',
+            'expert': {
+                'deadline_s': 900.0,
+                'interfaces': {
+                    'perception': {
+                        'action': '/perception_interface',
+                        'states': ['DETECT_TABLETOP'],
+                        'description': 'Mark the object in the camera frame',
+                    },
+                    'manipulation': {
+                        'action': '/manipulation_interface',
+                        'states': ['PICK'],
+                        'description': 'Drive the hand',
+                    },
                 },
             },
+            'tree': {'escalate': False},
         },
     )
     sm.execute()

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 import unittest
-from typing import Dict, List, Optional
+from typing import Any, Dict, List, Optional
 
 import actionlib
 import rospy
@@ -94,7 +94,7 @@ class AfterPreemptTest(unittest.TestCase):
         self.server.set_succeeded(TestResult(result=goal.goal))
 
     def start(self, how: str, after_preempt_s: Optional[float] = LIMIT_S) -> Process:
-        given: Dict[str, float] = {'deadline_s': 1.0}
+        given: Dict[str, Any] = {'expert': {'deadline_s': 1.0}}
         if after_preempt_s is not None:
             given['after_preempt_s'] = after_preempt_s
         task = oracle_run(

@@ -46,13 +46,15 @@ def main():
         name='FETCH',
         settings={
             'prior': 0.8,
-            'deadline_s': 600.0,
-            'interfaces': {
-                'manipulation': {
-                    'action': '/manipulation_interface',
-                    'description': 'Drive the hand',
-                    'states': ['PICK'],
-                }
+            'expert': {
+                'deadline_s': 600.0,
+                'interfaces': {
+                    'manipulation': {
+                        'action': '/manipulation_interface',
+                        'description': 'Drive the hand',
+                        'states': ['PICK'],
+                    }
+                },
             },
         },
     )

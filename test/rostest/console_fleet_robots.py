@@ -46,7 +46,7 @@ def run(number, robots, lacks):
         for each in set(range(robots)) - {lacks}:
             smach.StateMachine.add('PLAN_{}'.format(each), Plan(each))
     OracleContainer.wrap(
-        sm, name='JOB', settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0}
+        sm, name='JOB', settings={'prior': 0.8, 'high_from': 0.75, 'expert': {'deadline_s': 300.0}}
     )
     sm.execute()
     rospy.set_param('~ended', True)

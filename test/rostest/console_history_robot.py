@@ -64,7 +64,7 @@ def main():
     OracleContainer.wrap(
         sm,
         name='FETCH',
-        settings={'prior': 0.8, 'high_from': 0.75, 'deadline_s': 300.0},
+        settings={'prior': 0.8, 'high_from': 0.75, 'expert': {'deadline_s': 300.0}},
         preconditions={
             'PICK': [hand_is_free, camera_answers, 'DETECT'],
             'PLACE': [(door_is_shut, smach.CBState(lambda ud: 'done', ['done']))],

@@ -46,15 +46,17 @@ def main():
         settings={
             'prior': 0.8,
             'high_from': 0.75,
-            'deadline_s': 300.0,
-            'escalate': False,
-            'interfaces': {
-                'perception': {
-                    'action': '/perception_interface',
-                    'states': ['DETECT_TABLETOP'],
-                    'description': 'Mark the object in the camera frame',
-                }
+            'expert': {
+                'deadline_s': 300.0,
+                'interfaces': {
+                    'perception': {
+                        'action': '/perception_interface',
+                        'states': ['DETECT_TABLETOP'],
+                        'description': 'Mark the object in the camera frame',
+                    }
+                },
             },
+            'tree': {'escalate': False},
         },
     )
     while not rospy.is_shutdown():

@@ -84,12 +84,18 @@ def main(argv):
         settings={
             'prior': prior,
             'high_from': 0.75,
-            'deadline_s': 300.0,
-            'escalate': False,
-            'states': {'FETCH/PICK': {'preconditions': ['DETECT']}},
-            'interfaces': {
-                'assist': {'action': '/assist', 'description': 'Guide the hand', 'states': ['PICK']}
+            'expert': {
+                'deadline_s': 300.0,
+                'interfaces': {
+                    'assist': {
+                        'action': '/assist',
+                        'description': 'Guide the hand',
+                        'states': ['PICK'],
+                    }
+                },
             },
+            'tree': {'escalate': False},
+            'states': {'FETCH/PICK': {'preconditions': ['DETECT']}},
         },
     )
     if rospy.get_param('~own_introspection', False):

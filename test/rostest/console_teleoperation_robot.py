@@ -44,15 +44,17 @@ def main():
         name='FETCH',
         settings={
             'prior': 0.8,
-            'deadline_s': 300.0,
-            'interfaces': {
-                'manipulation': {
-                    'action': '/manipulation_interface',
-                    'description': 'Drive the hand',
-                    'states': ['PICK'],
-                    'node': 'smach_oracle manipulation_interface',
-                    'args': ['__name:=manipulation_interface'],
-                }
+            'expert': {
+                'deadline_s': 300.0,
+                'interfaces': {
+                    'manipulation': {
+                        'action': '/manipulation_interface',
+                        'description': 'Drive the hand',
+                        'states': ['PICK'],
+                        'node': 'smach_oracle manipulation_interface',
+                        'args': ['__name:=manipulation_interface'],
+                    }
+                },
             },
         },
     )

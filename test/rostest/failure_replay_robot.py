@@ -42,7 +42,7 @@ def main():
     with sm:
         smach.StateMachine.add('LOOK', Work(0), transitions={'done': 'PICK'})
         smach.StateMachine.add('PICK', Work(failures))
-    OracleContainer.wrap(sm, name='FETCH', settings={'deadline_s': 300.0})
+    OracleContainer.wrap(sm, name='FETCH', settings={'expert': {'deadline_s': 300.0}})
     sm.execute()
     if not rospy.is_shutdown():
         rospy.signal_shutdown('the trial is over')

@@ -143,7 +143,9 @@ class MasterRestartTest(unittest.TestCase):
         return task
 
     def asking(self) -> str:
-        return script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 60}), 'oracle.yaml')
+        return script(
+            self, json.dumps({'max_recoveries': 0, 'expert': {'deadline_s': 60}}), 'oracle.yaml'
+        )
 
     def registered_events(self) -> bool:
         return '/task/oracle/events' in self.master.system()['publishers']

@@ -47,7 +47,7 @@ class PausedSimulationTest(unittest.TestCase):
 
     def test_a_time_limit_and_a_deadline_pass_though_the_clock_stands(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
-            task = self.start('deadline_s: 1.0\n', '--record', folder)
+            task = self.start('expert: {deadline_s: 1.0}\n', '--record', folder)
             self.assertEqual(task.wait(), 0, task.output())
             self.assertIn('OUTCOME aborted 0.0', task.output())
             kinds = [event.kind for event in recorded_events(folder, 'robots/one/task')[0]]
@@ -62,7 +62,7 @@ class PausedSimulationTest(unittest.TestCase):
     def test_an_expert_answers_a_robot_in_a_namespace(self) -> None:
         log = EventLog(self, 'robots/one/task')
         front_end = FrontEnd(self, '/robots/one/task/expert_query')
-        task = self.start('deadline_s: 60.0\n')
+        task = self.start('expert: {deadline_s: 60.0}\n')
         question = front_end.question(state='PICK')
         self.assertTrue(question, task.output())
         reply = front_end.answer(
@@ -78,7 +78,7 @@ class PausedSimulationTest(unittest.TestCase):
 
     def test_ctrl_c_ends_it_in_time(self) -> None:
         front_end = FrontEnd(self, '/robots/one/task/expert_query')
-        task = self.start('deadline_s: 0\n')
+        task = self.start('expert: {deadline_s: 0}\n')
         self.assertTrue(front_end.question(state='PICK'), task.output())
         began = time.monotonic()
         task.signal(signal.SIGINT)

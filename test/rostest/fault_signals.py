@@ -78,7 +78,8 @@ runner.join()
 """
 LIBRARY = """
 from smach_oracle import OracleContainer
-sm = OracleContainer.wrap(sm, settings={'max_recoveries': 0, 'deadline_s': 0}, name='TASK')
+settings = {'max_recoveries': 0, 'expert': {'deadline_s': 0}}
+sm = OracleContainer.wrap(sm, settings=settings, name='TASK')
 """
 
 
@@ -96,7 +97,7 @@ class SignalsTest(unittest.TestCase):
         self, place: str, text: str = TASK + RUN, settings: Optional[Dict[str, object]] = None
     ) -> Process:
         config = script(
-            self, json.dumps(dict({'deadline_s': 0}, **(settings or {}))), 'oracle.yaml'
+            self, json.dumps(dict({'expert': {'deadline_s': 0}}, **(settings or {}))), 'oracle.yaml'
         )
         task = oracle_run(
             self, '--config', config, '--record', self.bags, script(self, text), place

@@ -93,7 +93,9 @@ START_S = 60.0
 class FaultyStatesTest(unittest.TestCase):
     def start(self, text: str, *args: str, **settings: Any) -> Process:
         """Start a script that waits for a line before it runs its machine."""
-        config = script(self, json.dumps(dict({'deadline_s': 30}, **settings)), 'oracle.yaml')
+        config = script(
+            self, json.dumps(dict({'expert': {'deadline_s': 30}}, **settings)), 'oracle.yaml'
+        )
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.bags = folder.name
@@ -232,7 +234,7 @@ class FaultyStatesTest(unittest.TestCase):
         self.assertTrue(task.says('OUTCOME succeeded'), task.output())
 
     def test_without_an_answer_the_machine_ends_as_it_would_have(self) -> None:
-        task = self.start(STATES, 'aborts', max_recoveries=0, deadline_s=1.0)
+        task = self.start(STATES, 'aborts', max_recoveries=0, expert={'deadline_s': 1.0})
         task.go_on()
         self.assertTrue(task.says('OUTCOME aborted'), task.output())
 

@@ -74,7 +74,9 @@ class InterfaceOnDemand(unittest.TestCase):
     def offer(self, **changes):
         entry = dict(yaml.safe_load(blocks('yaml')[-1])['interfaces']['by_hand'], **changes)
         entry = {key: value for key, value in entry.items() if value is not None}
-        return Settings.from_dict({'interfaces': {'by_hand': entry}}).offers_for('', 'PICK')[0]
+        return Settings.from_dict({'expert': {'interfaces': {'by_hand': entry}}}).offers_for(
+            '', 'PICK'
+        )[0]
 
     def run_interface(self, offer, work):
         """Run it while a person works in a thread; the answer. Nobody waits on when the person has

@@ -167,8 +167,8 @@ class KilledFleet:
                 {
                     'max_recoveries': 0,
                     'policy': 'prose',
-                    'deadline_s': deadline_s,
-                    'on_resume': 'recover',
+                    'expert': {'deadline_s': deadline_s},
+                    'checkpoint': {'on_resume': 'recover'},
                     'userdata': 'keep',
                 },
                 stream,

@@ -44,8 +44,8 @@ print('OUTCOME', sm.execute(), flush=True)
 '''
 SETTINGS = {
     'states': {'ALL/*': {'max_recoveries': 0}, 'BOTH/LIFT': {'max_recoveries': 0}},
-    'escalate': False,
-    'deadline_s': 50,
+    'tree': {'escalate': False},
+    'expert': {'deadline_s': 50},
 }
 
 

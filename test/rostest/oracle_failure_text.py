@@ -33,7 +33,9 @@ class FailureTextTest(unittest.TestCase):
             execute_cb=lambda goal: server.set_aborted(text=REASON),
         )
         server.start()
-        config = script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 30}), 'oracle.yaml')
+        config = script(
+            self, json.dumps({'max_recoveries': 0, 'expert': {'deadline_s': 30}}), 'oracle.yaml'
+        )
         expert = FrontEnd(self, '/task/expert_query')
         task = oracle_run(self, '--config', config, script(self, SCRIPT))
         question = expert.question(state='MOVE')

@@ -45,7 +45,7 @@ WRAPPED_BEFORE_THE_NODE = (
 sm = smach.StateMachine(outcomes=OUTCOMES)
 with sm:
     smach.StateMachine.add('PICK', Turn('aborted'))
-settings = {'max_recoveries': 3, 'deadline_s': 30.0}
+settings = {'max_recoveries': 3, 'expert': {'deadline_s': 30.0}}
 assert OracleContainer.wrap(sm, settings=settings, name='ROBOT') is sm
 rospy.init_node('task')
 run(sm)

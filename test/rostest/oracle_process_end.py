@@ -47,7 +47,7 @@ if how == 'preempted':
 """
 LIBRARY = """
 from smach_oracle import OracleContainer
-OracleContainer.wrap(sm, settings={'max_recoveries': 0, 'deadline_s': 1.0}, name='TASK')
+OracleContainer.wrap(sm, settings={'max_recoveries': 0, 'expert': {'deadline_s': 1.0}}, name='TASK')
 """
 SLOW_OBSERVER = """
 from smach_oracle.oracle import oracle_of
@@ -117,7 +117,9 @@ class ProcessEndTest(unittest.TestCase):
         self.check(how, self.library(how))
 
     def check_oracle_run(self, how: str) -> None:
-        settings = script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 1.0}), 'oracle.yaml')
+        settings = script(
+            self, json.dumps({'max_recoveries': 0, 'expert': {'deadline_s': 1.0}}), 'oracle.yaml'
+        )
         self.check(
             how,
             oracle_run(

@@ -177,7 +177,7 @@ class OracleRunTest(unittest.TestCase):
 
     def test_settings_come_from_the_file_and_over_it_from_the_parameter_server(self) -> None:
         with tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
-            config.write('memory: 4\ndeadline_s: 0\nmax_recoveries: 5\n')
+            config.write('memory: 4\nexpert: {deadline_s: 0}\nmax_recoveries: 5\n')
             config.flush()
             rospy.set_param('/task/oracle', {'max_recoveries': 0})
             self.addCleanup(rospy.delete_param, '/task/oracle')

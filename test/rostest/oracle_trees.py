@@ -49,7 +49,9 @@ server.stop()
 
 class TreesTest(unittest.TestCase):
     def setUp(self) -> None:
-        config = script(self, json.dumps({'max_recoveries': 0, 'deadline_s': 60}), 'oracle.yaml')
+        config = script(
+            self, json.dumps({'max_recoveries': 0, 'expert': {'deadline_s': 60}}), 'oracle.yaml'
+        )
         self.expert = FrontEnd(self, '/task/expert_query')
         self.task = oracle_run(self, '--config', config, script(self, SCRIPT))
 

@@ -23,8 +23,8 @@ WAYS = (BARE, LIBRARY, ORACLE_RUN)
 HUNG_AFTER_S = 100.0
 AT_ONCE = 2
 # nobody answers; what cannot be recovered from ends as it would have
-RECOVERING = {'deadline_s': 0.3}
-HELPLESS = {'deadline_s': 0.3, 'max_recoveries': 1}
+RECOVERING = {'expert': {'deadline_s': 0.3}}
+HELPLESS = {'expert': {'deadline_s': 0.3}, 'max_recoveries': 1}
 # what a script is given beside its ending
 ARGUMENTS = {'arguments': ['--config', 'x', '--record', '_speed:=5', 'arm:=left_arm']}
 _MARKER = re.compile(r'^( *)# built: (.+)$', re.MULTILINE)

@@ -114,7 +114,7 @@ class StillRunningTest(unittest.TestCase):
         self.expert = FrontEnd(self, '/task/expert_query')
 
     def start(self, text: str) -> Process:
-        settings = {'still_running_s': 0.5, 'still_running_factor': 1, 'deadline_s': 30}
+        settings = {'still_running': {'after_s': 0.5, 'factor': 1}, 'expert': {'deadline_s': 30}}
         config = script(self, json.dumps(settings), 'oracle.yaml')
         return oracle_run(self, '--config', config, '--record', self.bags, script(self, text))
 

@@ -91,7 +91,7 @@ class KilledTest(SurvivingCase):
         task = self.run_task(goal=Behaviour.HANG)
         self.assertTrue(task.says('LOOKS', 40.0), task.output())
         self.kill(task)
-        hurried = script(self, 'deadline_s: 1\n', 'hurried.yaml')
+        hurried = script(self, 'expert: {deadline_s: 1}\n', 'hurried.yaml')
         for _ in range(2):
             again = self.run_task('--config', hurried)
             again.wait(60.0)

@@ -78,7 +78,7 @@ class PartsTest(SurvivingCase):
         self.assertIn('LOOKS', again.output())
         refused = self.run_task('--from', '999999')
         self.assertEqual(refused.wait(40.0), 2, refused.output())
-        self.assertIn('resume_from: 999999', refused.output())
+        self.assertIn('checkpoint.from: 999999', refused.output())
 
     def test_a_program_that_roslaunch_begins_again_asks_before_it_moves(self):
         expert, traffic = FrontEnd(self, EXPERTS), Traffic(self)

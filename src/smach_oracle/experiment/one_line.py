@@ -6,7 +6,7 @@ import yaml
 
 TASKS_FOLDER = Path(__file__).parent.parent / 'tasks'
 CONFIG_FILE = 'one_line.yaml'
-OF_THE_ROBOT = 'interfaces'  # key of the settings that it offers, whoever writes the task
+GROUP, OF_THE_ROBOT = 'expert', 'interfaces'  # what it offers, whoever writes the task
 
 
 def write_config(folder: Path, task: str) -> Path:
@@ -16,6 +16,7 @@ def write_config(folder: Path, task: str) -> Path:
     """
     settings = yaml.safe_load((TASKS_FOLDER / (task + '.yaml')).read_text(encoding='utf-8'))
     path = folder / CONFIG_FILE
-    kept = {key: settings[key] for key in (OF_THE_ROBOT,) if key in settings}
+    group = settings.get(GROUP, {})
+    kept = {GROUP: {OF_THE_ROBOT: group[OF_THE_ROBOT]}} if OF_THE_ROBOT in group else {}
     path.write_text(yaml.safe_dump(kept, sort_keys=True), encoding='utf-8')
     return path

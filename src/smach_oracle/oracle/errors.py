@@ -42,6 +42,10 @@ class SettingsError(OracleError, ValueError):
             '{}: {}'.format(origin, self.key), self.value, self.allowed, text, self._problem
         )
 
+    def called(self, key: str) -> 'SettingsError':
+        """Return the same error about a key under another name."""
+        return SettingsError(key, self.value, self.allowed, self._text, self._problem)
+
     def allowing(self, more: str) -> 'SettingsError':
         """Return the same error with more that is allowed."""
         return SettingsError(self.key, self.value, self.allowed + more, self._text, self._problem)

@@ -196,16 +196,15 @@ def take_parameters(machine: BareContainer, strict: Strictness = False) -> None:
         return
     # Python objects that they name are looked up in this thread: a module may be imported for it
     parameters = outside_main_thread(functools.partial(read_param, DEFAULT_PARAM))
-    checkpoint, checkpoint_name = outside_main_thread(read_checkpoint)
-    if parameters or checkpoint:
+    checkpoint = outside_main_thread(read_checkpoint)
+    if parameters.values or checkpoint.values:
         settings = LoadedSettings(given.settings)
-        for values, name in (
-            (parameters, 'parameter ' + rospy.resolve_name(DEFAULT_PARAM)),
-            (checkpoint, checkpoint_name),
-        ):
-            for change in settings.overridden_by(values):
-                _tell_once('{}: the {} overrides {}'.format(oracle_of(machine).path, name, change))
-            settings.put(values, name)
+        for source in (parameters, checkpoint):
+            for change in settings.overridden_by(source.values):
+                _tell_once(
+                    '{}: the {} overrides {}'.format(oracle_of(machine).path, source.origin, change)
+                )
+            settings.put(*source)
         complain: Strictness = strict
         if callable(strict):
             complain = Complaint(strict, settings.located)

@@ -1,12 +1,13 @@
 """Settings of the executive from a YAML file, the parameter server and the command line.
 
 The parameter `~oracle` overrides the file, the command line overrides both. Mappings are merged key
-by key, everything else is replaced. `smach_oracle.oracle` checks the values. Here every error
-learns where the key came from.
+by key, everything else is replaced. Before that, each source is put in groups, so that a key
+overrides the same one under its older name. `smach_oracle.oracle` checks the values. Here every
+error learns where the key came from.
 """
 
 import importlib
-from typing import Any, Dict, Iterable, Iterator, List, Mapping, Optional, Tuple, cast
+from typing import Any, Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Tuple, cast
 
 import rospy
 
@@ -14,14 +15,26 @@ from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.identity import is_same
 from smach_oracle.oracle.settings.names import did_you_mean
 from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.oracle.settings.settings import GROUPS
 from smach_oracle.oracle.settings.written import plain
 
+from .log.said_once import warn_once
 from .parameters import read_or_default
 from .reading.yaml_files import read_yaml
 
 DEFAULT_PARAM = '~oracle'
 CHECKPOINT_PARAM = '~checkpoint'  # goes before the key of DEFAULT_PARAM
 PYTHON_PREFIX = 'python:'
+IN_CODE = 'settings given in code'
+
+
+class SettingsSource(NamedTuple):
+    """Settings from one place, in groups."""
+
+    values: Mapping[str, Any]
+    origin: str  # what to call the place in an error
+    lines: Mapping[str, int] = {}  # of its dotted keys, where it is a file
+    written: Mapping[str, str] = {}  # how a key is written, where it is in another way
 
 
 class LoadedSettings(Dict[str, Any]):
@@ -30,26 +43,33 @@ class LoadedSettings(Dict[str, Any]):
     def __init__(self, values: Optional[Mapping[str, Any]] = None) -> None:
         super().__init__()
         self._origins: Dict[str, str] = {}
+        self._written: Dict[str, str] = {}
         if values:
-            self.put(values, 'settings given in code')
+            self.put(*in_groups(values, IN_CODE, is_code=True))
 
     def put(
-        self, values: Mapping[str, Any], origin: str, lines: Optional[Mapping[str, int]] = None
+        self,
+        values: Mapping[str, Any],
+        origin: str,
+        lines: Optional[Mapping[str, int]] = None,
+        written: Optional[Mapping[str, str]] = None,
     ) -> None:
         """Merge values over those that are there.
 
         :param origin: what to call this source in an error.
         :param lines: dotted key -> line number, where the source is a file.
+        :param written: dotted key -> how an error is to name it, where it is written so.
         """
         _merge_into(self, values)
         lines = lines or {}
         for key in _dotted_keys(values):
+            self._written[key] = (written or {}).get(key, key)
             items = [item for item in lines if item.startswith(key + '[')]
             for replaced in [known for known in self._origins if known.startswith(key + '[')]:
                 del self._origins[replaced]
             for each in [key] + items:
                 line = lines.get(each)
-                self._origins[each] = '{} line {}'.format(origin, line) if line else origin
+                self._origins[each] = _place(origin, line)
 
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
         """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
@@ -71,9 +91,9 @@ class LoadedSettings(Dict[str, Any]):
         return ''
 
     def located(self, err: SettingsError) -> SettingsError:
-        """Return the same error, naming the source as well."""
+        """Return the same error, naming the source as well, and the key as it is written there."""
         origin = self.origin(err.key)
-        return err.set_at(origin) if origin else err
+        return err.called(_moved(err.key, self._written)).set_at(origin) if origin else err
 
 
 def load_settings(
@@ -91,39 +111,81 @@ def load_settings(
     settings = LoadedSettings()
     if path:
         values, lines = read_yaml(path_of(path))
-        settings.put(values, str(path), lines)
+        settings.put(*in_groups(values, str(path), lines))
     if param and rospy.core.is_initialized():
-        settings.put(read_param(param), 'parameter ' + rospy.resolve_name(param))
+        settings.put(*read_param(param))
         settings.put(*read_checkpoint())
     if overrides:
-        settings.put(overrides, 'command line')
+        settings.put(*in_groups(overrides, 'command line'))
     return settings
 
 
-def read_param(param: str) -> Dict[str, Any]:
-    """Read a mapping from the parameter server.
+def in_groups(
+    values: Mapping[str, Any],
+    origin: str,
+    lines: Optional[Mapping[str, int]] = None,
+    is_code: bool = False,
+) -> SettingsSource:
+    """Return settings with each key in its group.
+
+    An older key is warned of, once. In code it is not: there it is the name of a field.
+
+    :raises SettingsError: as `Groups.given_in`, naming the place.
+    """
+    lines = lines or {}
+    try:
+        given = GROUPS.given_in(values)
+    except SettingsError as err:
+        raise err.set_at(_place(origin, lines.get(err.key))) from err
+    written = {GROUPS.key_of(each.name): each.written for each in given}
+    for key, older in written.items():
+        if older in GROUPS.older_keys() and not is_code:
+            place = _place(origin, lines.get(older))
+            warn_once('{}: {} is now called {}'.format(place, older, key))
+    moved = {older: key for key, older in written.items()}
+    return SettingsSource(
+        GROUPS.in_groups(given),
+        origin,
+        {_moved(key, moved): line for key, line in lines.items()},
+        written,
+    )
+
+
+def _place(origin: str, line: Optional[int]) -> str:
+    return '{} line {}'.format(origin, line) if line else origin
+
+
+def _moved(key: str, moved: Mapping[str, str]) -> str:
+    """Return a dotted key under another name, as what it lies in has one."""
+    for old, new in moved.items():
+        if old != new and (key == old or key.startswith((old + '.', old + '['))):
+            return new + key[len(old) :]
+    return key
+
+
+def read_param(param: str) -> SettingsSource:
+    """Read a mapping of settings from the parameter server.
 
     :returns: empty where it is not set, or the master cannot be asked (logged): a robot starts
         without it.
-    :raises SettingsError: where it is set to something else.
+    :raises SettingsError: where it is set to something else, or is wrong as `in_groups` says.
     """
+    name = 'parameter ' + str(rospy.resolve_name(param))
     values = read_or_default(param, {})
     if not isinstance(values, dict):
-        raise SettingsError(
-            'parameter ' + rospy.resolve_name(param), values, 'a mapping of settings'
-        )
+        raise SettingsError(name, values, 'a mapping of settings')
     if isinstance(values.get('states'), dict):
         values['states'] = dict(_state_entries(values['states']))
-    return values
+    return in_groups(values, name)
 
 
-def read_checkpoint() -> Tuple[Dict[str, Any], str]:
+def read_checkpoint() -> SettingsSource:
     """Return the private parameter `~checkpoint` as a setting, empty where it is not set.
 
-    :returns: with it the name of the parameter.
+    :raises SettingsError: where it is neither the name of a file nor the group of this name.
     """
     value = read_or_default(CHECKPOINT_PARAM, '')
-    return (
+    return in_groups(
         {'checkpoint': value} if value != '' else {},
         'parameter ' + str(rospy.resolve_name(CHECKPOINT_PARAM)),
     )

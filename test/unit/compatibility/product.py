@@ -74,7 +74,7 @@ def settings_of(path: Path) -> Dict[str, Any]:
 def from_parameter(value: Mapping[str, Any], monkeypatch: Any) -> Dict[str, Any]:
     """The effective values of a mapping that the parameter server holds as ~oracle."""
     _serve({'oracle': value}, monkeypatch)
-    return _effective(read_param('~oracle'))
+    return _effective(read_param('~oracle').values)
 
 
 def _effective(given: Mapping[str, Any]) -> Dict[str, Any]:

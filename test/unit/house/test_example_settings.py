@@ -11,7 +11,7 @@ import yaml
 from house import ROOT
 
 from smach_oracle.oracle.errors import SettingsError
-from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.settings import GROUPS, Settings
 
 TEXT = (ROOT / 'launch/oracle.yaml').read_text(encoding='utf-8')
 
@@ -34,7 +34,15 @@ def setting_names():
 
 
 def interface_keys():
-    return allowed({'interfaces': {'by_hand': {'unknown': 1}}})
+    return allowed({'expert': {'interfaces': {'by_hand': {'unknown': 1}}}})
+
+
+def rows_below(heading):
+    """The keys in the first table below a heading of the page."""
+    page = (ROOT / 'doc/settings.md').read_text(encoding='utf-8')
+    section = page[page.index('\n{}\n'.format(heading)) :]
+    table = section[section.index('\n|') :].split('\n\n')[0]
+    return re.findall(r'^\| `([a-z_]+)`', table, re.MULTILINE)
 
 
 def resolved(name):
@@ -45,13 +53,33 @@ def resolved(name):
 def test_every_setting_is_there_with_its_default():
     given = uncommented()
     assert set(given) == setting_names()
-    examples = {key: given.pop(key) for key in ('interfaces', 'states')}
+    for group in GROUPS.texts:
+        assert set(given[group]) == {
+            GROUPS.key_of(each).split('.')[1] for each in GROUPS.members(group)
+        }
+    examples = {'expert': {'interfaces': given['expert'].pop('interfaces')}}
+    examples['states'] = given.pop('states')
     assert Settings.from_dict(given) == Settings()
     assert Settings.from_dict(examples, resolved).interfaces
 
 
+def test_at_the_top_of_the_page_there_are_few_rows_and_all_that_there_are():
+    top = rows_below('## Every setting')
+    assert len(top) == len(set(top)) <= 28
+    assert set(top) == setting_names()
+    for group in GROUPS.texts:
+        assert rows_below('### ' + group), group
+    assert rows_below('### states') == ['preconditions']
+
+
+def test_the_page_has_every_older_name():
+    page = (ROOT / 'doc/settings.md').read_text(encoding='utf-8')
+    listed = dict(re.findall(r'^\| `(\w+)` \| `([a-z_.]+)` \|$', page, re.MULTILINE))
+    assert listed == GROUPS.older_keys() and len(listed) >= 17
+
+
 def test_every_key_of_an_interface_is_there():
-    offers = uncommented()['interfaces'].values()
+    offers = uncommented()['expert']['interfaces'].values()
     assert {key for offer in offers for key in offer} == interface_keys()
 
 

@@ -89,7 +89,7 @@ def test_a_function_of_a_module_is_found_by_its_name():
     [
         ('/motors_on', 'healthy', 'a list of conditions, or one'),
         (['/motors_on'], 'healthy[0]', 'a mapping with one of the keys'),
-        ({}, 'healthy', 'topic, diagnostics and function'),
+        ({'field': 'data'}, 'healthy.field', 'topic, diagnostics, function'),
         ([{'topic': '/a', 'function': is_well}], 'healthy[0]', 'one of the keys'),
         ({'topic': ''}, 'healthy.topic', 'a string that is not empty'),
         ({'topic': 'motors on'}, 'healthy.topic', 'the name of a topic'),

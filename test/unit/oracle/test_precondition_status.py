@@ -91,7 +91,7 @@ def test_what_it_writes_is_dropped_and_what_it_raises_is_told():
 def test_it_can_be_switched_off():
     called = []
     _, found = asked({'B': [called.append]}, watch_preconditions=False)
-    assert found[0][1:] == (None, 'watch_preconditions is off')
+    assert found[0][1:] == (None, 'expert.watch_preconditions is off')
     assert not called
 
 

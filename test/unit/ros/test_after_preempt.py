@@ -165,7 +165,7 @@ def test_a_signal_while_a_trial_begins_preempts_its_first_state(program):
 
 
 def test_a_signal_while_a_trial_resumes_preempts_it(program):
-    stored = 'checkpoint: store, on_resume: recover, after_preempt_s: 5'
+    stored = 'checkpoint: {file: store, on_resume: recover}, after_preempt_s: 5'
     killed = program('', '{' + stored + '}')
     killed.process.kill()
     killed.process.wait()

@@ -36,16 +36,18 @@ def run(tmp_path):
 
 
 ALL_UNKNOWN = """
-nested: [ARMM]
-on_no_answer: {goto: HOEM}
-on_resume: state:GRAPS
-resume_map: {OLD: HOEM}
+tree: {nested: [ARMM]}
+checkpoint:
+  on_resume: state:GRAPS
+  map: {OLD: HOEM}
 states:
   GRAPS: {on_retry: confirm}
   HOME: {failure_outcomes: [abortde]}
   ARM*/**: {memory: 3}
-interfaces:
-  by_hand: {action: by_hand, states: [GRSAP]}
+expert:
+  on_no_answer: {goto: HOEM}
+  interfaces:
+    by_hand: {action: by_hand, states: [GRSAP]}
 """
 
 
@@ -56,11 +58,11 @@ def test_a_check_names_every_unknown_name_in_any_setting_and_ends_with_2(run):
     for part in (
         "states.GRAPS: 'GRAPS' is no state (did you mean GRASP?)",
         'states.ARM*/**: ',
-        'nested',
-        'on_no_answer',
-        'on_resume',
-        'resume_map.OLD',
-        'interfaces.by_hand.states',
+        'line 2: tree.nested',
+        'line 11: expert.on_no_answer',
+        'line 4: checkpoint.on_resume',
+        'line 5: checkpoint.map.OLD',
+        'line 13: expert.interfaces.by_hand.states',
         "states.HOME.failure_outcomes: 'abortde' is no outcome (did you mean aborted?)",
     ):
         assert any(part in line for line in told), (part, told)

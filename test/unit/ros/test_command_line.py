@@ -68,7 +68,7 @@ def test_options_become_settings_and_options_of_the_process(script, tmp_path):
     assert run.overrides == {
         'policy': 'algorithm1',
         'rates_file': str(tmp_path / 'rates.json'),
-        'nested': False,
+        'tree': {'nested': False},
     }
     assert (run.record, run.record_topics) == (str(tmp_path / 'bags'), ('/tf', '/camera'))
     assert (run.recover, run.config, run.script_args) == (False, 'o.yaml', ['--n', '3'])

@@ -145,16 +145,16 @@ def test_a_wrong_value_names_file_line_key_value_and_what_is_allowed(write):
 
 def test_the_parameter_server_goes_over_the_file_and_the_command_line_over_both(write, node):
     path = write('policy: prose\nmemory: 3\nstates:\n  PICK: {memory: 4, prior: 0.3}\n')
-    node(oracle={'memory': 5, 'states': {'PICK': {'memory': 6}}, 'deadline_s': 7.0})
-    settings = load_settings(path, overrides={'deadline_s': 8.0})
+    node(oracle={'memory': 5, 'states': {'PICK': {'memory': 6}}, 'expert': {'deadline_s': 7.0}})
+    settings = load_settings(path, overrides={'expert': {'deadline_s': 8.0}})
     assert settings == {
         'policy': 'prose',
         'memory': 5,
-        'deadline_s': 8.0,
+        'expert': {'deadline_s': 8.0},
         'states': {'PICK': {'memory': 6, 'prior': 0.3}},
     }
     assert settings.origin('memory') == 'parameter /robot/oracle'
-    assert settings.origin('deadline_s') == 'command line'
+    assert settings.origin('expert.deadline_s') == 'command line'
     assert 'line 4' in settings.origin('states.PICK.prior')
 
 
@@ -181,7 +181,7 @@ def test_a_state_of_a_nested_machine_can_be_set_by_parameter(node):
             }
         }
     )
-    assert read_param('~oracle')['states'] == {
+    assert read_param('~oracle').values['states'] == {
         'TASK': {'memory': 3},
         'TASK/PICK': {'memory': 4},
         'TASK/ARM/MOVE': {'prior': 0.2},
@@ -196,7 +196,7 @@ def test_an_unreachable_master_does_not_keep_the_robot_from_starting(node, monke
         raise ConnectionRefusedError('nobody there')
 
     monkeypatch.setattr(settings_module.rospy, 'get_param', refuse)
-    assert read_param('~oracle') == {}
+    assert read_param('~oracle').values == {}
 
 
 def test_without_a_node_no_parameter_is_asked_for(write):
@@ -260,5 +260,10 @@ def test_what_a_parameter_overrides_is_named():
         {'max_recoveries': 5, 'memory': 10, 'states': {'PICK': {'prior': 0.2}}}
     )
     assert settings.overridden_by(
-        {'max_recoveries': 0, 'memory': 10, 'deadline_s': 3.0, 'states': {'PICK': {'prior': 0.3}}}
+        {
+            'max_recoveries': 0,
+            'memory': 10,
+            'expert': {'deadline_s': 3.0},
+            'states': {'PICK': {'prior': 0.3}},
+        }
     ) == ['max_recoveries: 5, now 0', 'states.PICK.prior: 0.2, now 0.3']

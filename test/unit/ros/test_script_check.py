@@ -29,8 +29,9 @@ states:
     memory: 4
   HOME:
     max_recoveries: 0
-interfaces:
-  by_hand: {action: by_hand, states: [PICK]}
+expert:
+  interfaces:
+    by_hand: {action: by_hand, states: [PICK]}
 """
 
 
@@ -262,7 +263,7 @@ def test_a_wrong_parameter_of_a_machine_wrapped_in_code_is_an_error(check, spy):
         ('states: {PICK: {preconditions: [HOEM]}}', "'HOEM' is not allowed"),
         ('states: {PICK: {preconditions: ["python:__main__:ready"]}}', "has no 'ready'"),
         ('oracle_label: PICK', 'oracle_label'),
-        ('on_no_answer: {jump: HOME}', 'on_no_answer'),
+        ('expert: {on_no_answer: {jump: HOME}}', 'expert.on_no_answer'),
     ],
 )
 def test_a_mistake_in_the_settings_ends_it_as_in_a_real_run(check, settings, why):
@@ -400,7 +401,7 @@ def test_what_the_oracle_may_do_in_branches_is_told(check):
             smach.StateMachine.add('TOUR', tour)
         top.execute()
     """,
-        '{states: {TOUR/*: {memory: 3}}, nested: [TOUR/**], escalate: false}',
+        '{states: {TOUR/*: {memory: 3}}, tree: {nested: [TOUR/**], escalate: false}}',
     )
     assert code == 0, errors
     lines = [' '.join(line.split()) for line in report.splitlines()]

@@ -119,7 +119,7 @@ def test_a_state_to_go_on_with_that_is_not_there_is_told(run, tmp_path):
     check_refused(
         run(tmp_path / 'robot.db', options=['--resume=state:NOWHERE']), "on_resume: 'state:NOWHERE'"
     )
-    check_refused(run(tmp_path / 'robot.db', options=['--from', '999']), 'resume_from: 999')
+    check_refused(run(tmp_path / 'robot.db', options=['--from', '999']), 'checkpoint.from: 999')
 
 
 def test_a_map_is_given_on_the_command_line(run, tmp_path):
@@ -128,7 +128,7 @@ def test_a_map_is_given_on_the_command_line(run, tmp_path):
     changed = "sm = machine('START', 'PICK')\nprint('OUTCOME', sm.execute())"
     check_refused(
         run(store, changed, ['--resume', '--resume-map', 'HOEM=START']),
-        "resume_map.HOEM: 'HOEM' is not allowed; allowed: a state of the machine that "
+        "checkpoint.map.HOEM: 'HOEM' is not allowed; allowed: a state of the machine that "
         'was stopped: HOME, PICK',
     )
     code, _, errors = run(store, changed, ['--resume', '--resume-map', 'HOME'])

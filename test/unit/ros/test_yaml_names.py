@@ -56,16 +56,17 @@ EVERYWHERE = """
 failing_outcomes: [{0}]
 failure_outcomes: [{0}]
 deep_copy_keys: [{0}]
-on_no_answer: {{goto: {0}}}
-nested: [{0}]
-resume_map: {{{0}: {0}}}
+tree: {{nested: [{0}]}}
+checkpoint: {{map: {{{0}: {0}}}}}
 oracle_label: {0}
 states:
   {0}:
     failure_outcomes: [{0}]
     preconditions: [{0}, {{check: {0}, achieve: {0}}}]
-interfaces:
-  {0}: {{action: {0}, description: {0}, states: [{0}]}}
+expert:
+  on_no_answer: {{goto: {0}}}
+  interfaces:
+    {0}: {{action: {0}, description: {0}, states: [{0}]}}
 """
 
 
@@ -114,13 +115,13 @@ def test_a_name_is_taken_as_it_is_written_wherever_a_name_is_expected(read, word
     ],
 )
 def test_a_number_is_read_where_a_number_is_expected(read, text, number):
-    assert read('deadline_s: {}'.format(text)).deadline_s == number
+    assert read('expert: {{deadline_s: {}}}'.format(text)).deadline_s == number
 
 
 def test_a_whole_number_may_have_an_exponent(read):
-    assert read('history_length: 1e3').history_length == 1000
+    assert read('expert: {history_length: 1e3}').history_length == 1000
     with pytest.raises(SettingsError, match='history_length'):
-        read('history_length: 1e-3')
+        read('expert: {history_length: 1e-3}')
 
 
 @pytest.mark.parametrize(
@@ -128,7 +129,9 @@ def test_a_whole_number_may_have_an_exponent(read):
     [('true', True), ('ON', True), ('yes', True), ('No', False), ('off', False), ('FALSE', False)],
 )
 def test_true_and_false_are_read_where_they_are_expected(read, text, flag):
-    settings = read('escalate: {0}\nnested: {0}\nhealthy: {{topic: /on, equals: {0}}}'.format(text))
+    settings = read(
+        'tree: {{escalate: {0}, nested: {0}}}\nhealthy: {{topic: /on, equals: {0}}}'.format(text)
+    )
     assert (settings.escalate, settings.nested, settings.healthy[0].equals) == (flag,) * 3
 
 

@@ -20,7 +20,7 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
 from ..settings.failure_rule import RULE, FailureRule
-from ..settings.settings import ALLOW
+from ..settings.settings import ALLOW, GROUPS
 from ..smach_private import data_of, initial_label_of, set_current_label, states_of, transitions_of
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_marks import Marks
@@ -238,7 +238,7 @@ def let_repeat(top: TreeNode, paths: Sequence[str], by_command: Optional[Sequenc
         place = place_named(top, path, at_rest=True)
         if place is None and path in paths:
             raise SettingsError(
-                'resume_repeat',
+                GROUPS.key_of('resume_repeat'),
                 path,
                 'the label of a state of {}, or the path of one below it'.format(top.path),
             )
@@ -259,7 +259,7 @@ def _jump_path_named(top: TreeNode, path: str) -> JumpPath:
     way = jump_path_to(top, place_named(top, path))
     if way is None:
         raise SettingsError(
-            'on_resume',
+            GROUPS.key_of('on_resume'),
             'state:' + path,
             'the label of a state of {}, or the path of one below it'.format(top.path),
         )

@@ -24,6 +24,7 @@ from smach_oracle.store.store_file import StoreFile
 
 from ..errors import SettingsError
 from ..machine.nesting import children_of
+from ..settings.settings import GROUPS
 from ..smach_private import (
     final_outcomes_of,
     initial_label_of,
@@ -237,9 +238,12 @@ def _name_unknown(name: str, names: Mapping[str, str], store: StoreFile, now: St
     )
     for path in sorted({path for pair in names.items() for path in pair}.difference(known)):
         smach.logwarn(
-            '{}: resume_map names {!r}, which is not a state of the machine, and was '
+            '{}: {} names {!r}, which is not a state of the machine, and was '
             'not one before; there are {}'.format(
-                name, path, ', '.join(sorted(renaming.states_of(now.description)))
+                name,
+                GROUPS.key_of('resume_map'),
+                path,
+                ', '.join(sorted(renaming.states_of(now.description))),
             )
         )
 
@@ -247,5 +251,7 @@ def _name_unknown(name: str, names: Mapping[str, str], store: StoreFile, now: St
 def _check(old: str, path: str, known: Collection[str], what: str) -> None:
     if path not in known:
         raise SettingsError(
-            'resume_map.' + old, path, '{}: {}'.format(what, ', '.join(sorted(known)))
+            '{}.{}'.format(GROUPS.key_of('resume_map'), old),
+            path,
+            '{}: {}'.format(what, ', '.join(sorted(known))),
         )

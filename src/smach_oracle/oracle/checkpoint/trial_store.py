@@ -27,6 +27,7 @@ from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.checks import ASK, RESTART
 from ..settings.failure_rule import FORMER_RULE, RULE, rule_in
+from ..settings.settings import GROUPS
 from .checkpointer import Checkpointer
 from .container_facts import fact_of
 from .resuming import Resumption, go_on
@@ -124,7 +125,7 @@ class TrialStore:
                     BEGINS_ANEW.format(
                         self._top.path,
                         self._store.path,
-                        'on_resume is restart'
+                        GROUPS.key_of('on_resume') + ' is restart'
                         if word == RESTART
                         else 'the last trial was stopped before its first state',
                     )
@@ -170,7 +171,7 @@ class TrialStore:
             return 0  # of another machine of the program
         if trial is None or unfinished is None or trial.number != unfinished.number:
             raise SettingsError(
-                'resume_from',
+                GROUPS.key_of('resume_from'),
                 number,
                 'a moment of the trial of {} that was stopped and has not ended'.format(
                     self._top.name

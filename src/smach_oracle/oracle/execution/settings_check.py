@@ -11,6 +11,7 @@ from ..machine.tree_node import TreeNode
 from ..settings.checks import STATE
 from ..settings.names import UnfitKind, UnfitName, did_you_mean, matches
 from ..settings.preconditions import PreconditionSpec
+from ..settings.settings import GROUPS
 from ..smach_private import states_of
 
 # settings that keep a state from being run where, or for longer than, its author wants
@@ -66,7 +67,7 @@ def _unfit_states(top: TreeNode) -> Iterator[UnfitName]:
         for name, given in settings.states.items()
     ]
     named += [
-        ('interfaces.{}.states'.format(offer.name), name, UnfitKind.NAME)
+        ('{}.{}.states'.format(GROUPS.key_of('interfaces'), offer.name), name, UnfitKind.NAME)
         for offer, states in settings.interfaces
         for name in states
     ]
@@ -87,18 +88,21 @@ def _unfit_nested(top: TreeNode) -> Iterator[UnfitName]:
                 'its Concurrences and Iterators: {}'
             ).format(top.path, ', '.join(known) or 'none')
             problem = 'names nothing in {}{}'.format(top.path, did_you_mean(name, known))
-            yield _unfit('nested', name, allowed, problem)
+            yield _unfit(GROUPS.key_of('nested'), name, allowed, problem)
 
 
 def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
     """Yield the states to which settings send the machine that are not in the tree."""
     settings, known = top.settings, _known_names(top)
     verb, target = settings.on_no_answer
-    named = [('on_no_answer', target, UnfitKind.CHECKED)] if verb == 'goto' else []
+    named = []
+    if verb == 'goto':
+        named.append((GROUPS.key_of('on_no_answer'), target, UnfitKind.CHECKED))
     if settings.on_resume[0] == STATE:
-        named.append(('on_resume', settings.on_resume[1], UnfitKind.CHECKED))
+        named.append((GROUPS.key_of('on_resume'), settings.on_resume[1], UnfitKind.CHECKED))
     named += [
-        ('resume_map.' + old, new, UnfitKind.CHECKED) for old, new in settings.resume_map.items()
+        ('{}.{}'.format(GROUPS.key_of('resume_map'), old), new, UnfitKind.CHECKED)
+        for old, new in settings.resume_map.items()
     ]
     for key, name, kind in named:
         if name.strip('/') not in known:
@@ -111,7 +115,7 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
     verb, target = settings.on_no_answer
     named: List[Tuple[str, str, str, UnfitKind]] = []
     if verb == 'give_up':
-        named.append(('on_no_answer', '**', target, UnfitKind.CHECKED))
+        named.append((GROUPS.key_of('on_no_answer'), '**', target, UnfitKind.CHECKED))
     for key in ('failure_outcomes', 'intended_outcomes'):
         named += [(key, '**', each, UnfitKind.GENERAL) for each in getattr(settings.defaults, key)]
         named += [

@@ -4,6 +4,7 @@ from typing import Optional
 
 from ..asking.question import names
 from ..machine.places import JumpPath, jump_path_to, place_named
+from ..settings.settings import GROUPS
 from .options import option_on, why_repeats
 from .recovery import Recovery
 from .verdict import Verdict
@@ -21,12 +22,16 @@ def fall_back(recovery: Recovery) -> Verdict:
         if way is not None and not problem:
             recovery.record.fallbacks += 1
             return recovery.jump(way, why)
-        recovery.warn('on_no_answer: cannot go to {!r}: {}; stopping'.format(target, problem))
+        _warn(recovery, 'cannot go to {!r}: {}; stopping'.format(target, problem))
     elif verb == 'give_up':
         if target in node.machine.get_registered_outcomes():
             return recovery.give_up(why, target)
-        recovery.warn('on_no_answer: {!r} is no outcome of this container; stopping'.format(target))
+        _warn(recovery, '{!r} is no outcome of this container; stopping'.format(target))
     return recovery.give_up(why)
+
+
+def _warn(recovery: Recovery, text: str) -> None:
+    recovery.warn('{}: {}'.format(GROUPS.key_of('on_no_answer'), text))
 
 
 def fallback_in_words(recovery: Recovery) -> str:

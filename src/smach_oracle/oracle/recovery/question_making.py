@@ -28,6 +28,7 @@ from ..machine.userdata import UserdataGate, behind
 from ..records.short_text import shortened
 from ..records.visits import VisitResult
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
+from ..settings.settings import GROUPS
 from ..smach_private import data_of, remapping_of, states_of
 from .falling_back import fallback_in_words
 from .options import Option, choices_on, places_on
@@ -211,7 +212,7 @@ class LivePreconditionProbe(PreconditionProbe):
         """
         spec = self._specs[number]
         if not self._node.settings.watch_preconditions:
-            return PreconditionStatus(None, 'watch_preconditions is off')
+            return PreconditionStatus(None, GROUPS.key_of('watch_preconditions') + ' is off')
         if spec.kind is not PreconditionKind.PAIR:
             return self._of(spec)
         check, achieve = spec.target

@@ -16,6 +16,7 @@ launch/oracle.yaml and doc/settings.md of those of the executive.
 import math
 from copy import copy
 from dataclasses import dataclass, field, fields
+from types import MappingProxyType
 from typing import (
     Any,
     Callable,
@@ -219,10 +220,31 @@ def time_limit(key: str, value: object) -> Optional[float]:
 
 
 def setting(
-    default: T, check: Callable[..., object], text: str = '', names_objects: bool = False
+    default: T,
+    check: Callable[..., object],
+    text: str = '',
+    names_objects: bool = False,
+    key: str = '',
+    short: str = '',
+    marks: Sequence[str] = (),
 ) -> T:
-    """Return the field of a setting. `names_objects`: the check also takes what imports these."""
-    facts = {'check': check, 'text': text, 'names_objects': names_objects}
+    """Return the field of a setting.
+
+    :param names_objects: the check also takes what imports objects.
+    :param key: GROUP.KEY, if files have it in a group.
+    :param short: what may stand in place of the whole group, in words. The field has the group's
+        name then.
+    :param marks: a mapping with one of these keys may so stand there, too.
+    """
+    facts = {
+        'default': default,
+        'check': check,
+        'text': text,
+        'names_objects': names_objects,
+        'key': key,
+        'short': short,
+        'marks': tuple(marks),
+    }
     if isinstance(default, dict):
         return field(default_factory=lambda: copy(default), metadata=facts)
     return field(default=default, metadata=facts)
@@ -234,16 +256,23 @@ def settings_of(group: type) -> Dict[str, Mapping[str, Any]]:
 
 
 def checked(
-    group: type, prefix: str, given: Mapping[str, object], resolver: 'Optional[Resolver]' = None
+    group: type,
+    prefix: str,
+    given: Mapping[str, object],
+    resolver: 'Optional[Resolver]' = None,
+    written: Mapping[str, str] = MappingProxyType({}),
 ) -> Dict[str, Any]:
     """Return those of the settings of a dataclass that are given, checked.
 
     `prefix` stands before their names in errors. `resolver` imports the objects that they name.
+    `written`: the keys under which some are given, by their names.
 
     :raises SettingsError: naming key, value and what is allowed.
     """
     return {
-        name: facts['check'](prefix + name, given[name], *[resolver] * facts['names_objects'])
+        name: facts['check'](
+            prefix + written.get(name, name), given[name], *[resolver] * facts['names_objects']
+        )
         for name, facts in settings_of(group).items()
         if name in given
     }

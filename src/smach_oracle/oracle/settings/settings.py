@@ -6,7 +6,7 @@ a SettingsError that names the dotted key, the value and what is allowed.
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Collection, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
 from ..decision.policies import POLICIES
@@ -24,7 +24,8 @@ from .checks import (
     setting,
     settings_of,
 )
-from .health import HealthCondition, checked_health
+from .groups import Groups, no_such
+from .health import HealthCondition, HealthKind, checked_health
 from .interfaces import START_LIMIT_S, InterfaceOffer, checked_interfaces
 from .names import Nested, check_name, checked_nested, did_you_mean, exactness, matches
 from .preconditions import PreconditionSpec, parse_preconditions
@@ -149,24 +150,33 @@ class Settings:
         300.0,
         values.deadline,
         's until the fallback, for all questions about one failure; 0: waits without end',
+        key='expert.deadline_s',
     )
     on_no_answer: Tuple[str, str] = setting(
         ('stop', ''),
         values.on_no_answer,
         'the fallback: `stop`, `{goto: LABEL}` or `{give_up: OUTCOME}`',
+        key='expert.on_no_answer',
     )
     escalate: bool = setting(
         False,
         values.flag,
         'an oracle that would ask [lets the one above decide first](trees.md#escalate)',
+        key='tree.escalate',
     )
     watch_preconditions: bool = setting(
         True,
         values.flag,
         'call functions among the preconditions while a question is open, to tell if they hold '
         '([expert.md](expert.md))',
+        key='expert.watch_preconditions',
     )
-    history_length: int = setting(50, _VISITS, 'visits that a question shows')
+    history_length: int = setting(
+        50,
+        _VISITS,
+        'visits that a question shows',
+        key='expert.history_length',
+    )
     rates_file: str = setting(
         '',
         values.file,
@@ -179,6 +189,7 @@ class Settings:
         'nested machines, and plain states of Iterators and Concurrences, have oracles of their '
         'own; or a list of [paths and patterns](trees.md#settings-by-patterns): '
         '`[ARM, ARM/**, ALL/EACH]`',
+        key='tree.nested',
     )
     # offer, states it serves ((): all)
     interfaces: Tuple[Tuple[InterfaceOffer, Tuple[str, ...]], ...] = setting(
@@ -187,6 +198,7 @@ class Settings:
         'shared-autonomy interfaces that the expert may choose, by name: `action`, `description`, '
         '`states`; to have it started `launch` or `node`, with `args` and `start_limit_s` ({:g}) '
         '([shared_autonomy.md](shared_autonomy.md))'.format(START_LIMIT_S),
+        key='expert.interfaces',
     )
     states: Mapping[str, Mapping[str, object]] = setting(
         {},
@@ -206,23 +218,29 @@ class Settings:
         checked_health,
         'what must hold for the robot [to be well](limits.md#health): a list, or one',
         names_objects=True,
+        key='healthy.conditions',
+        short='a list of conditions, or one',
+        marks=tuple(kind.value for kind in HealthKind),
     )
     health_settle_s: float = setting(
         0.5,
         _MINUTE,
         's from 0 to 60: how long the oracle watches the health after a failure, and how long all '
         'must hold before the machine goes on',
+        key='healthy.settle_s',
     )
     still_running_s: float = setting(
         60.0,
         _SECONDS,
         's after which a person is asked about a state that the oracle has entered, that has no '
         'time limit, and that [still runs](limits.md#still-running); 0: never',
+        key='still_running.after_s',
     )
     still_running_factor: float = setting(
         10.0,
         values.number(1, math.inf, 'a number from 1'),
         'the state must also take so many times as long as it ever did',
+        key='still_running.factor',
     )
     step_back_across: bool = setting(
         False,
@@ -230,6 +248,7 @@ class Settings:
         'where nothing was visited before the failed state in its container, a step back leads to '
         'what ran before in the one above '
         '([trees.md](trees.md#preconditions-and-steps-back-across-containers))',
+        key='tree.step_back_across',
     )
     # those that are not the policy's defaults
     policy_parameters: Mapping[str, float] = field(default_factory=dict)
@@ -238,15 +257,21 @@ class Settings:
         values.file,
         'keep where the machine stands in this [store](survive.md), to go on from it after a '
         "crash; '': in none",
+        key='checkpoint.file',
+        short='the name of a file',
     )
     checkpoint_wait_s: float = setting(
-        1.0, _MINUTE, "s from 0 to 60 that the machine waits for the store's disk"
+        1.0,
+        _MINUTE,
+        "s from 0 to 60 that the machine waits for the store's disk",
+        key='checkpoint.wait_s',
     )
     checkpoint_synchronous: str = setting(
         'FULL',
         values.choice(('FULL', 'NORMAL', 'OFF')),
         '`FULL`: a power cut loses nothing that was stored; `NORMAL`: it may lose the last '
         'moments; `OFF`: it may damage the store',
+        key='checkpoint.synchronous',
     )
     # and for STATE the path of a state
     on_resume: Tuple[str, str] = setting(
@@ -254,18 +279,21 @@ class Settings:
         checked_on_resume,
         'what is done about a stored trial that was not finished: `ask`, `recover`, `restart` or '
         '`state:LABEL`',
+        key='checkpoint.on_resume',
     )
     resume_from: int = setting(
         0,
         _MOMENT,
         'number of the stored moment to go on from, once (table `moments` of the store); 0: the '
         'last one of the trial',
+        key='checkpoint.from',
     )
     resume_map: Mapping[str, str] = setting(
         {},
         checked_resume_map,
         'where the script has [changed](survive.md#a-script-that-has-changed): paths of states by '
         'those that they had, such as `{OLD: NEW, KITCHEN/OLD: COOK/NEW}`',
+        key='checkpoint.map',
     )
     after_preempt_s: float = setting(
         0.0,
@@ -278,6 +306,7 @@ class Settings:
         values.words,
         'states that the trial that goes on may [repeat](survive.md#what-is-not-repeated) once, '
         'whatever `on_retry` says. Give it on the command line, as `--repeat`, rather than here',
+        key='checkpoint.repeat',
     )
     cost: Prices = setting(
         Prices(),
@@ -298,11 +327,11 @@ class Settings:
 
         :raises SettingsError: naming key, value and what is allowed.
         """
-        given = values.mapping('settings', given)
-        names = sorted({*settings_of(StateSettings), *settings_of(cls)} - {'preconditions'})
-        _refuse_unknown('', given, names)
-        defaults = replace(StateSettings(), **_checked_state('', given, StateSettings(), resolver))
-        found = checked(cls, '', given, resolver)
+        entries = GROUPS.given_in(values.mapping('settings', given))
+        flat = {each.name: each.value for each in entries}
+        _refuse_unknown('', flat, {*settings_of(cls), *_OF_ALL_STATES}, GROUPS.top_keys())
+        defaults = replace(StateSettings(), **_checked_state('', flat, StateSettings(), resolver))
+        found = checked(cls, '', flat, resolver, {each.name: each.written for each in entries})
         if 'policy' in found:
             found['policy'], found['policy_parameters'] = found['policy']
         states = found.pop('states', {})
@@ -331,7 +360,8 @@ class Settings:
         for name, given in states.items():
             prefix = 'states.{}.'.format(check_name('states', name))
             overrides = values.mapping(prefix[:-1], given)
-            _refuse_unknown(prefix, overrides, sorted(settings_of(StateSettings)))
+            names = sorted(settings_of(StateSettings))
+            _refuse_unknown(prefix, overrides, names, names)
             merged.setdefault(name, {}).update(
                 _checked_state(prefix, overrides, self.defaults, resolver)
             )
@@ -347,27 +377,40 @@ class Settings:
         )
 
 
-def _refuse_unknown(prefix: str, given: Mapping[str, object], allowed: List[str]) -> None:
+_OF_ALL_STATES = [name for name in settings_of(StateSettings) if name != 'preconditions']
+GROUPS = Groups(
+    settings_of(Settings),
+    _OF_ALL_STATES,
+    {
+        'expert': 'the [expert](expert.md), and the questions that it is asked',
+        'still_running': 'a state that [does not end](limits.md#still-running)',
+        'healthy': "the robot's [health](limits.md#health): its conditions, or this group",
+        'tree': 'machines that [lie in each other](trees.md)',
+        'checkpoint': 'the [store](survive.md) of where the machine stands: a file, or this group',
+    },
+)
+
+
+def _refuse_unknown(
+    prefix: str, given: Mapping[str, object], known: Collection[str], allowed: Sequence[str]
+) -> None:
     for key in given:
-        if key not in allowed:
-            keys = 'one of the keys ' + ', '.join(allowed)
-            raise SettingsError(
-                prefix + key,
-                given[key],
-                keys,
-                '{}: no such setting{}; allowed: {}'.format(
-                    prefix + key, _hint(prefix, key, allowed), keys
-                ),
-            )
+        if key not in known:
+            raise no_such(prefix + key, given[key], allowed, _hint(prefix, key))
 
 
-def _hint(prefix: str, key: str, allowed: List[str]) -> str:
+def _hint(prefix: str, key: str) -> str:
     """Say where the key belongs, or which one may be meant."""
     if not prefix and key == 'preconditions':
         return ' here (it belongs to a state: below states: LABEL:)'
-    if prefix and key in settings_of(Settings):
-        return ' of a state (it holds for the whole machine: move it to the top of the settings)'
-    return did_you_mean(key, allowed)
+    if not prefix:
+        return GROUPS.hint(key)
+    if key in settings_of(Settings) or key in GROUPS.texts:
+        place = GROUPS.key_of(key)
+        return ' of a state (it holds for the whole machine: {})'.format(
+            'it is called ' + place if '.' in place else 'move it to the top of the settings'
+        )
+    return did_you_mean(key, settings_of(StateSettings))
 
 
 def _checked_state(

@@ -15,7 +15,7 @@ from smach_oracle.oracle.prospects import (
     OutcomeProspect,
     StateProspect,
 )
-from smach_oracle.oracle.settings.settings import Settings, StateSettings
+from smach_oracle.oracle.settings.settings import GROUPS, Settings, StateSettings
 
 from .setting_words import in_words
 
@@ -271,7 +271,7 @@ def _either(actions: Sequence[Action]) -> str:
 def _changed(settings: Any, others: Any, left_out: Sequence[str]) -> List[str]:
     """The fields in which settings differ from others, as "memory 5"."""
     return [
-        '{} {}'.format(each.name, in_words(getattr(settings, each.name)))
+        '{} {}'.format(GROUPS.key_of(each.name), in_words(getattr(settings, each.name)))
         for each in fields(settings)
         if each.name not in left_out and getattr(settings, each.name) != getattr(others, each.name)
     ]

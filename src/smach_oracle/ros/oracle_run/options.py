@@ -184,6 +184,11 @@ class Invocation(NamedTuple):
     only_check: bool = False
     of_wrapping: Sequence[str] = ()  # the options that a machine gets when it is wrapped
 
+    @property
+    def resumes(self) -> bool:
+        """Whether a stored trial is to go on."""
+        return 'on_resume' in self.overrides.get('checkpoint', {})
+
 
 def parse(args: Sequence[str]) -> Invocation:
     """Understand the command line.
@@ -208,9 +213,11 @@ def parse(args: Sequence[str]) -> Invocation:
         overrides['policy'] = given.policy
     if given.rates_file:
         overrides['rates_file'] = os.path.abspath(path_of(given.rates_file))
-    overrides.update(_stored(given))
+    stored = _stored(given)
+    if stored:
+        overrides['checkpoint'] = stored
     if given.no_nested:
-        overrides['nested'] = False
+        overrides['tree'] = {'nested': False}
     record = os.path.abspath(path_of(given.record)) if given.record else ''
     return Invocation(
         script,
@@ -231,18 +238,18 @@ def _names_of(options: Sequence[str]) -> List[str]:
 
 
 def _stored(given: argparse.Namespace) -> Dict[str, Any]:
-    """Return the settings about what is stored."""
+    """Return the settings of the group `checkpoint`."""
     found: Dict[str, Any] = {}
     if given.checkpoint:
-        found['checkpoint'] = os.path.abspath(path_of(given.checkpoint))
+        found['file'] = os.path.abspath(path_of(given.checkpoint))
     if given.resume or given.moment is not None:
         found['on_resume'] = given.resume or 'recover'
     if given.moment is not None:
-        found['resume_from'] = given.moment
+        found['from'] = given.moment
     if given.resume_map:
-        found['resume_map'] = dict(given.resume_map)
+        found['map'] = dict(given.resume_map)
     if given.repeat:
-        found['resume_repeat'] = given.repeat
+        found['repeat'] = given.repeat
     return found
 
 

@@ -18,7 +18,7 @@ from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.names import UnfitKind, UnfitName
 from smach_oracle.oracle.settings.paths import check_writable
-from smach_oracle.oracle.settings.settings import Settings
+from smach_oracle.oracle.settings.settings import GROUPS, Settings
 
 from .. import attachment, shutdown
 from ..loaded_settings import LoadedSettings, load_settings, resolve_python
@@ -42,7 +42,7 @@ def check(invocation: Invocation) -> None:
         if settings.rates_file:
             check_writable('rates_file', settings.rates_file, replaced=True)
         if settings.checkpoint:
-            check_writable('checkpoint', settings.checkpoint, replaced=True)
+            check_writable(GROUPS.key_of('checkpoint'), settings.checkpoint, replaced=True)
     if invocation.record and not invocation.only_check:
         from ..recorder import prepare_folder
 
@@ -148,8 +148,10 @@ class MachineWrapper:
         loaded = load(self._invocation)
         with _located(loaded):
             settings = read_settings(loaded)
-            if not settings.checkpoint and 'on_resume' in self._invocation.overrides:
-                raise SettingsError('checkpoint', '', 'a file, where a machine is to be resumed')
+            if not settings.checkpoint and self._invocation.resumes:
+                raise SettingsError(
+                    GROUPS.key_of('checkpoint'), '', 'a file, where a machine is to be resumed'
+                )
             complain = Complaint(self._judge(machine, self._is_first), loaded.located)
             if self._invocation.recover:
                 for problem in sorted_preconditions(machine, settings).misplaced:

@@ -166,7 +166,7 @@ def test_restart_begins_anew_and_says_so(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     killed.run(kill_at=12)
     told = killed.run(on_resume='restart')
-    assert any('a new one begins: on_resume is restart' in line for line in told['log'])
+    assert any('a new one begins: checkpoint.on_resume is restart' in line for line in told['log'])
     assert told['events'][0][0] == 'TRIAL_START' and told['done'] == ['A', 'B', 'C']
     assert killed.diary.count('begins')['A'] == 2
 
@@ -280,11 +280,11 @@ def test_a_moment_that_is_not_there_is_refused(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     killed.run(kill_at=12)
     begun = killed.diary.count('begins')
-    assert 'resume_from: 999' in killed.run(resume_from=999)['error']
+    assert 'checkpoint.from: 999' in killed.run(resume_from=999)['error']
     assert killed.diary.count('begins') == begun
     assert killed.run()['outcome'] == 'succeeded'
     ended = moments_of(killed)[2].number
-    assert 'resume_from: {}'.format(ended) in killed.run(resume_from=ended)['error']
+    assert 'checkpoint.from: {}'.format(ended) in killed.run(resume_from=ended)['error']
 
 
 def test_what_is_spent_is_stored_where_it_has_changed(tmp_path):

@@ -18,7 +18,7 @@ from smach_oracle.interfaces.manipulation.settings import TeleoperationSettings
 from smach_oracle.interfaces.perception.output_templates import OUTPUT_PARTS, templates_from
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.checks import settings_of
-from smach_oracle.oracle.settings.settings import Settings, StateSettings
+from smach_oracle.oracle.settings.settings import GROUPS, Settings, StateSettings
 from smach_oracle.ros import loaded_settings, parameters
 from smach_oracle.ros.expert import server
 from smach_oracle.scripted_operator.state_plans import MEANS, StatePlans
@@ -102,15 +102,21 @@ _HEALTHY = st.one_of(
     mapping_of({'diagnostics': texts, 'worst': words('ok', 'warn')}, ['diagnostics']),
     mapping_of({'function': words('python:checks:near'), 'name': texts}, ['function']),
 )
-settings_given = mapping_of(
-    {
-        **_drawn(StateSettings(), 'preconditions'),
-        **_drawn(Settings()),
-        'states': st.dictionaries(names, mapping_of(_drawn(StateSettings())), max_size=2),
-        'interfaces': st.dictionaries(names, _OFFER, max_size=2),
-        'healthy': st.one_of(st.lists(_HEALTHY, max_size=2), _HEALTHY),
-    }
-)
+BY_NAME = {
+    **_drawn(StateSettings(), 'preconditions'),
+    **_drawn(Settings()),
+    'states': st.dictionaries(names, mapping_of(_drawn(StateSettings())), max_size=2),
+    'interfaces': st.dictionaries(names, _OFFER, max_size=2),
+    'healthy': st.one_of(st.lists(_HEALTHY, max_size=2), _HEALTHY),
+}
+
+
+def _group(group: str) -> Any:
+    members = {GROUPS.key_of(name).split('.')[1]: BY_NAME[name] for name in GROUPS.members(group)}
+    return st.one_of(*([BY_NAME[group]] if group in BY_NAME else []), mapping_of(members))
+
+
+settings_given = mapping_of({**BY_NAME, **{group: _group(group) for group in GROUPS.texts}})
 
 
 def _settled(make: Callable[[], Any]) -> str:
