@@ -2,7 +2,6 @@
 // Driving a robot's hand: hold to move, let go to stop. The server relays what is fresh only, and
 // the robot has a watchdog.
 import { vector } from '../drawing/transforms.js';
-import { unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { remember, remembered } from '../page/preferences.js';
@@ -46,8 +45,6 @@ export class ManipulationPanel {
     this.arm = ''; // the one that the interface has chosen, until the person chooses
     /** @type {number | null} */
     this.wheel = null; // the number under which this page took it
-    this.armsKey = '';
-    this.factsKey = '[]';
     this.arms = h('div', { class: 'row wrap arms', role: 'group', 'aria-label': 'Arm' });
     this.wheelButton = h('button', { class: 'primary wheel', onclick: () => this.turnWheel() });
     this.driver = h('span', { class: 'dim driver', role: 'status' });
@@ -147,14 +144,9 @@ export class ManipulationPanel {
     const command = this.mine ? 'leave_wheel' : 'take_wheel';
     this.input.releaseAll();
     setText(this.problem, '');
-    try {
-      const reply = await this.app.connection.request(command, { question: this.question.key });
-      this.wheel = reply.ok && reply.data ? reply.data.wheel : null;
-      if (!reply.ok) setText(this.problem, reply.message);
-    } catch (err) {
-      unlessLost(err);
-      this.wheel = null;
-    }
+    const reply = await this.app.connection.ask(command, { question: this.question.key }, '');
+    this.wheel = reply.ok && reply.data ? reply.data.wheel : null;
+    setText(this.problem, reply.ok ? '' : reply.message);
     this.update();
   }
 
@@ -162,13 +154,9 @@ export class ManipulationPanel {
   async stopHand() {
     this.input.releaseAll();
     setText(this.problem, '');
-    try {
-      const reply = await this.app.connection.request('stop_hand', { question: this.question.key });
-      if (!reply.ok) setText(this.problem, reply.message);
-    } catch (err) {
-      unlessLost(err);
-      setText(this.problem, CANNOT_STOP);
-    }
+    const { key: question } = this.question;
+    const { ok, message } = await this.app.connection.ask('stop_hand', { question }, CANNOT_STOP);
+    if (!ok) setText(this.problem, message);
   }
 
   /**
@@ -197,9 +185,6 @@ export class ManipulationPanel {
   showArms({ arms, state }) {
     if (this.arm && !arms.includes(this.arm)) this.arm = '';
     const now = this.arm || (state ? state.arm : '');
-    const key = JSON.stringify([arms, now]);
-    if (key === this.armsKey) return;
-    this.armsKey = key;
     this.arms.hidden = arms.length < 2;
     redraw(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { key: arm,
       class: 'tool', 'data-arm': arm, 'aria-pressed': arm === now,
@@ -291,9 +276,6 @@ export class ManipulationPanel {
 
   /** @param {[name: string, value: string][]} facts */
   showFacts(facts) {
-    const key = JSON.stringify(facts);
-    if (key === this.factsKey) return;
-    this.factsKey = key;
     redraw(this.facts, facts.map(([name, value]) => [h('dt', {}, name),
       h('dd', { class: 'number', 'data-fact': name.toLowerCase() }, value)]));
   }

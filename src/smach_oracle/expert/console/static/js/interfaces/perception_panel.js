@@ -1,7 +1,8 @@
 // @ts-check
 // Marking an object in the very image of the failure: draw around it, refine, accept; the machine
 // goes on.
-import { h, replace, setText } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
+import { redrawWith } from '../page/redraw.js';
 import { drawImage } from '../sensors/image_canvas.js';
 import { SensorFeed } from '../sensors/sensor_feed.js';
 import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
@@ -44,7 +45,6 @@ export class PerceptionPanel {
     /** @type {server.Marked | null} */
     this.marked = null;
     this.warning = '';
-    this.resultKey = ''; // of what is shown of it
     this.image = h('canvas', { class: 'image', width: 4, height: 3, role: 'img',
       'aria-label': 'The image to draw on' });
     this.canvas = this.makeCanvas();
@@ -267,13 +267,10 @@ export class PerceptionPanel {
   showResult() {
     const { marked, warning, cutting } = this;
     const drawn = Boolean(this.marking.region);
-    const key = JSON.stringify([marked, drawn, cutting, warning, this.may]);
-    if (key === this.resultKey) return;
-    this.resultKey = key;
-    if (marked && marked.object) {
-      replace(this.result, markedFacts(marked.object, marked.elapsed),
-        warning && h('p', { class: 'dim' }, warning));
-    } else replace(this.result, h('p', { class: 'dim' }, this.hint(drawn)));
+    redrawWith(this.result, [marked, drawn, cutting, warning, this.may], () => (
+      marked && marked.object ? [markedFacts(marked.object, marked.elapsed),
+        warning && h('p', { class: 'dim' }, warning)]
+        : h('p', { class: 'dim' }, this.hint(drawn))));
   }
 
   /** @param {boolean} drawn */

@@ -116,6 +116,7 @@ export class App {
     const main = part('main');
     if (main.firstElementChild !== shown.view.root) replace(main, shown.view.root);
     this.looking.tell();
+    shown.view.draw?.();
     shown.view.shown?.();
   }
 
@@ -143,7 +144,9 @@ export class App {
   /** @param {string[]} names of sections */
   update(names) {
     if (names.includes('questions')) this.alerts.look(this.store.questions, this.store.now());
-    for (const { view, badge } of this.tabs) {
+    for (const { id, view, badge } of this.tabs) {
+      const { sections } = view;
+      if (id === this.current && names.some((name) => sections?.test(name))) view.draw?.();
       view.update?.(names);
       const count = view.badge ? view.badge() : 0;
       badge.hidden = !count;
@@ -157,7 +160,8 @@ export class App {
     if (this.connection.connected && this.liveness.console > RECONNECT_AFTER_S) {
       this.connection.connect();
     }
-    for (const { id, view } of this.tabs) if (id === this.current) view.tick?.();
+    this.tabNow.view.draw?.();
+    this.tabNow.view.tick?.();
   }
 
   /** Whether what is shown is live: said in the top bar; the styles grey what is not. */

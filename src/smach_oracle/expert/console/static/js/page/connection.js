@@ -201,6 +201,23 @@ export class Connection {
   }
 
   /**
+   * The same; where no reply comes it is not done, for a reason that the caller knows.
+   * @template {keyof server.Commands} Name
+   * @param {Name} name
+   * @param {server.Commands[Name]} args
+   * @param {string | ((err: unknown) => string)} lost what is said then
+   * @returns {Promise<Omit<server.Reply<Name>, 're'>>}
+   */
+  async ask(name, args, lost) {
+    try {
+      return await this.request(name, args);
+    } catch (err) {
+      unlessLost(err);
+      return { ok: false, message: typeof lost === 'string' ? lost : lost(err) };
+    }
+  }
+
+  /**
    * @template {keyof server.Commands} Name
    * @param {Name} name
    * @param {server.Commands[Name]} args

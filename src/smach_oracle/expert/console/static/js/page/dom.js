@@ -8,6 +8,9 @@ const UNSEEN = new RegExp('[\\u0000-\\u0008\\u000b-\\u001f\\u007f-\\u009f\\u00ad
   + '\\u2028-\\u202e\\u2060-\\u206f\\ufeff\\ufff9-\\ufffb]', 'g');
 /** @type {WeakMap<Node, string>} */
 const keys = new WeakMap();
+/** @typedef {(event: Event) => void} Listener */
+/** @type {WeakMap<Node, Map<string, Listener>>} */
+const listeners = new WeakMap(); // by the type of event
 
 /** @param {unknown} text */
 function clean(text) {
@@ -30,12 +33,37 @@ function fill(element, properties, children) {
   for (const [name, value] of Object.entries(properties)) {
     if (value === null || value === undefined) continue;
     if (typeof value === 'function') {
-      element.addEventListener(name.slice(2), /** @type {EventListener} */ (value));
+      listen(element, name.slice(2), /** @type {Listener} */ (value));
     } else if (name === 'key') keys.set(element, String(value));
     else setAttribute(element, name, value);
   }
   element.append(...nodesOf(children));
   return element;
+}
+
+/**
+ * @param {Node} element
+ * @param {string} type
+ * @param {Listener} listener in place of the one that it had
+ */
+function listen(element, type, listener) {
+  const own = listeners.get(element) || new Map();
+  listeners.set(element, own);
+  if (!own.has(type)) element.addEventListener(type, (event) => own.get(type)(event));
+  own.set(type, listener);
+}
+
+/**
+ * An element hears what another one of its kind was made to hear, and nothing else.
+ * @param {Node} element
+ * @param {Node} other
+ */
+export function listenAs(element, other) {
+  const wanted = listeners.get(other) || new Map();
+  for (const type of listeners.get(element)?.keys() || []) {
+    if (!wanted.has(type)) listen(element, type, () => {});
+  }
+  for (const [type, listener] of wanted) listen(element, type, listener);
 }
 
 /**
@@ -103,6 +131,16 @@ export function replace(element, ...children) {
 export function setText(element, text) {
   const cleaned = clean(text);
   if (element.textContent !== cleaned) element.textContent = cleaned;
+}
+
+/**
+ * Put words into an element, which is there only where there are some.
+ * @param {HTMLElement} element
+ * @param {string} words
+ */
+export function say(element, words) {
+  element.hidden = !words;
+  setText(element, words);
 }
 
 /**

@@ -1,10 +1,16 @@
 // @ts-check
 // Lists that change in place. What is pressed stays under the pointer until it is let go: around it
 // nothing comes or goes meanwhile, so that a click that has begun is not lost, nor lands elsewhere.
-import { keyOf, nodesOf } from './dom.js';
+import { keyOf, listenAs, nodesOf } from './dom.js';
 
 const CLICK_MS = 100; // by then the click of what was let go has come
 const PRESSED = 'button, summary, [role="button"], .mark, .event';
+// a person has opened it, and the page has noted how long it lies there
+const KEPT = new Set(['open', 'data-settled']);
+/** @type {WeakMap<Element, string>} */
+const drawn = new WeakMap(); // of what
+/** @type {WeakMap<Node, HTMLElement>} */
+const kept = new WeakMap(); // by what stands for it in a view
 /** @type {Map<Element, () => void>} */
 const waiting = new Map(); // by element, its newest change
 /** @type {Element | null} */
@@ -22,26 +28,95 @@ export function arrange(element, ...children) {
 }
 
 /**
+ * What stands in a view for an element that is not made again: the view must not take it out of the
+ * page, where it may have the focus.
+ * @param {HTMLElement} element
+ */
+export function keep(element) {
+  const place = document.createElement('template');
+  kept.set(place, element);
+  return place;
+}
+
+/**
+ * An element becomes like a view of its kind, which was made again: this is how a panel changes.
+ * @param {HTMLElement} element
+ * @param {HTMLElement} view
+ */
+export function render(element, view) { whenLetGo(element, () => { alike(element, view); }); }
+
+/**
  * As if the element's children were replaced by these, which were made again; but those that are
- * there become like them, each like the one of its kind and `key`. They keep their listeners, which
- * therefore go by the key alone.
+ * there become like them, each like the one of its kind and `key`.
  * @param {Element} element
  * @param {...page.Child} children
  */
 export function redraw(element, ...children) {
   whenLetGo(element, () => {
+    const nodes = nodesOf(children).map((node) => kept.get(node) || node);
+    const stay = new Set(nodes);
     /** @type {Map<string, ChildNode[]>} */
     const before = new Map();
     for (const node of element.childNodes) {
+      if (stay.has(node)) continue;
       const same = before.get(nameOf(node));
       if (same) same.push(node);
       else before.set(nameOf(node), [node]);
     }
-    put(element, nodesOf(children).map((node) => {
+    put(element, nodes.map((node) => {
+      if (node.parentNode === element) return node;
       const old = (before.get(nameOf(node)) || []).shift();
-      return old ? alike(old, node) : node;
+      return old ? alike(old, node) : fillPlaces(node);
     }));
   });
+}
+
+/**
+ * A part of a view that comes in as it is, with the elements that it keeps.
+ * @param {Node} node
+ */
+function fillPlaces(node) {
+  if (node instanceof Element) {
+    for (const place of node.querySelectorAll('template')) {
+      const element = kept.get(place);
+      if (element) place.replaceWith(element);
+    }
+  }
+  return node;
+}
+
+/**
+ * The same where what it is drawn of is other data than last time: long lists take a while.
+ * @param {Element} element
+ * @param {unknown} data
+ * @param {() => page.Child} childrenOf
+ * @returns {boolean} whether it is
+ */
+export function redrawWith(element, data, childrenOf) {
+  const other = isOther(element, data);
+  if (other) redraw(element, childrenOf());
+  return other;
+}
+
+/**
+ * The same of a view: for one of many.
+ * @param {HTMLElement} element
+ * @param {unknown} data
+ * @param {() => HTMLElement} viewOf
+ */
+export function renderWith(element, data, viewOf) {
+  if (isOther(element, data)) render(element, viewOf());
+}
+
+/**
+ * @param {Element} element
+ * @param {unknown} data
+ */
+function isOther(element, data) {
+  const text = JSON.stringify(data);
+  if (drawn.get(element) === text) return false;
+  drawn.set(element, text);
+  return true;
 }
 
 /**
@@ -78,6 +153,7 @@ function alike(old, fresh) {
     if (old.data !== fresh.data) old.data = fresh.data;
   } else if (old instanceof Element && fresh instanceof Element) {
     copyAttributes(fresh, old);
+    listenAs(old, fresh);
     redraw(old, [...fresh.childNodes]);
   }
   return old;
@@ -89,13 +165,16 @@ function alike(old, fresh) {
  */
 function copyAttributes(from, to) {
   for (const { name } of [...to.attributes]) {
-    if (!from.hasAttribute(name) && name !== 'open') to.removeAttribute(name); // a person opened it
+    if (!from.hasAttribute(name) && !KEPT.has(name)) to.removeAttribute(name);
   }
   for (const { name, value } of from.attributes) {
     if (to.getAttribute(name) === value) continue;
     if (name === 'style' && (to instanceof HTMLElement || to instanceof SVGElement)) {
       to.style.cssText = value; // the page's policy allows no other way
     } else to.setAttribute(name, value);
+  }
+  if (from instanceof HTMLInputElement && to instanceof HTMLInputElement) {
+    to.checked = from.checked; // the attribute says how it was at first
   }
 }
 

@@ -20,12 +20,12 @@ type Handlers = {
     ((event: GlobalEventHandlersEventMap[Type]) => void) | null;
 };
 
-type AttributeName = 'alt' | 'autocomplete' | 'class' | 'colspan' | 'cx' | 'cy' | 'd' | 'disabled'
-  | 'for' | 'height' | 'href' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits' | 'markerWidth'
-  | 'marker-end' | 'max' | 'maxlength' | 'method' | 'min' | 'open' | 'orient' | 'placeholder'
-  | 'r' | 'refX' | 'refY' | 'required' | 'role' | 'rows' | 'rx' | 'scope' | 'selected'
-  | 'spellcheck' | 'src' | 'step' | 'tabindex' | 'text-anchor' | 'title' | 'transform' | 'type'
-  | 'value' | 'viewBox' | 'width' | 'x' | 'x1' | 'x2' | 'y' | 'y1' | 'y2';
+type AttributeName = 'alt' | 'autocomplete' | 'checked' | 'class' | 'colspan' | 'cx' | 'cy' | 'd'
+  | 'disabled' | 'for' | 'height' | 'href' | 'hidden' | 'id' | 'markerHeight' | 'markerUnits'
+  | 'markerWidth' | 'marker-end' | 'max' | 'maxlength' | 'method' | 'min' | 'open' | 'orient'
+  | 'placeholder' | 'r' | 'refX' | 'refY' | 'required' | 'role' | 'rows' | 'rx' | 'scope'
+  | 'selected' | 'spellcheck' | 'src' | 'step' | 'tabindex' | 'text-anchor' | 'title'
+  | 'transform' | 'type' | 'value' | 'viewBox' | 'width' | 'x' | 'x1' | 'x2' | 'y' | 'y1' | 'y2';
 
 /** Attributes, properties of the style (--hue), listeners; `key`: which one it is, for redraw. */
 export type Properties = Handlers & {
@@ -56,7 +56,11 @@ export interface Panel {
 
 export interface PanelView {
   readonly root: HTMLElement;
-  /** Sections have changed. */
+  /** The sections that it is drawn of: it is drawn as they change, while it is shown. */
+  readonly sections?: RegExp;
+  /** It becomes a view of what there is now: as it comes, and every second while it is shown. */
+  draw?(): void;
+  /** Sections have changed, of which it notes something also while another panel is shown. */
   update?(names: string[]): void;
   /** It is shown now. */
   shown?(): void;

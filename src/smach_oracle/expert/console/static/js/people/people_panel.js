@@ -1,9 +1,8 @@
 // @ts-check
 // Who did what and when, how long it took, and the notes for the next shift.
-import { unlessLost } from '../page/connection.js';
 import { h, setText } from '../page/dom.js';
 import { clock, duration } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { redraw, redrawWith } from '../page/redraw.js';
 
 /** @type {page.Panel} */
 export const people = { id: 'people', title: 'People', create: (app) => new PeoplePanel(app) };
@@ -37,24 +36,23 @@ class PeoplePanel {
             h('th', { scope: 'col' }, title))))), this.acts))));
   }
 
-  shown() { this.update(['people', 'acts']); }
+  get sections() { return /^(?:people|acts)$/; }
 
-  /** @param {string[]} names of sections */
-  update(names) {
+  draw() {
     const found = this.app.store.get('people');
-    if (names.includes('people') && found) {
+    if (found) {
       const { app } = this;
       redraw(this.notes, notesOf(found, app.mayAnswer, (note) => this.send('drop_note', { note })));
       redraw(this.shifts, h('h2', {}, 'Shifts'), shiftsOf(found));
       this.leave.disabled = this.text.disabled = !app.mayAnswer;
     }
-    if (names.includes('acts') && this.app.current === 'people') this.showActs();
+    this.showActs();
   }
 
   showActs() {
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
     const acts = this.app.store.get('acts')?.acts || [];
-    redraw(this.acts, acts.filter((act) => words.every((word) => (
+    redrawWith(this.acts, [acts, words], () => acts.filter((act) => words.every((word) => (
       [act.who, act.what, act.robot, act.message, act.role].join(' ').toLowerCase().includes(word)
     ))).map(actRow));
   }
@@ -73,15 +71,9 @@ class PeoplePanel {
    * @returns {Promise<boolean>} whether it is done
    */
   async send(name, args) {
-    try {
-      const reply = await this.app.connection.request(name, args);
-      setText(this.problem, reply.ok ? '' : reply.message);
-      return reply.ok;
-    } catch (err) {
-      unlessLost(err);
-      setText(this.problem, LOST);
-      return false;
-    }
+    const { ok, message } = await this.app.connection.ask(name, args, LOST);
+    setText(this.problem, ok ? '' : message);
+    return ok;
   }
 }
 

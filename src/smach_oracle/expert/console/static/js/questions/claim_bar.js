@@ -1,6 +1,7 @@
 // @ts-check
 // Who works on a question, and how to take it.
-import { h, replace } from '../page/dom.js';
+import { h } from '../page/dom.js';
+import { render } from '../page/redraw.js';
 
 /**
  * @typedef {object} ClaimState
@@ -36,7 +37,6 @@ export class ClaimBar {
   constructor(use) {
     this.use = use;
     this.root = h('div', { class: 'claim-bar', role: 'status' });
-    this.key = ''; // of what is shown
   }
 
   /**
@@ -50,15 +50,11 @@ export class ClaimBar {
 
   /** @param {ClaimState} state */
   show(state) {
-    const { now, problem } = state;
-    const key = JSON.stringify([{ ...state, now: now && [now.holder, now.session, now.status] }]);
-    if (key === this.key) return;
-    this.key = key;
+    const { problem } = state;
     const { kind, words } = this.barOf(state);
-    this.root.className = 'claim-bar ' + kind;
-    replace(this.root, words && h('span', {}, words),
-      problem && h('span', { class: 'problem', role: 'alert' }, problem));
-    this.root.hidden = !words && !problem;
+    render(this.root, h('div', { class: 'claim-bar ' + kind, role: 'status',
+      hidden: !words && !problem }, words && h('span', {}, words),
+    problem && h('span', { key: 'problem', class: 'problem', role: 'alert' }, problem)));
   }
 
   /**
@@ -103,5 +99,6 @@ export class ClaimBar {
  */
 function button(text, onclick, id) {
   // what lets go, and has no id, is never pressed too soon
-  return h('button', { class: 'inline', onclick, 'data-action': id, 'data-deliberate': id }, text);
+  return h('button', { key: text, class: 'inline', onclick, 'data-action': id,
+    'data-deliberate': id }, text);
 }

@@ -1,6 +1,6 @@
 // @ts-check
 // Who else looks at a question now.
-import { h, setText } from '../page/dom.js';
+import { h, say } from '../page/dom.js';
 
 const PAUSE_MS = 1000; // turning the pages fast uses up no limit on commands
 const ELSEWHERE = ' (in another browser)';
@@ -35,8 +35,7 @@ export class Onlookers {
 
   show() {
     const names = namesOf(this.app, this.key);
-    this.root.hidden = !names.length;
-    setText(this.root, names.length ? 'Also looking at it: ' + names.join(', ') + '.' : '');
+    say(this.root, names.length ? 'Also looking at it: ' + names.join(', ') + '.' : '');
   }
 }
 

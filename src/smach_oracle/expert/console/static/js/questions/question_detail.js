@@ -5,13 +5,13 @@ import { FollowUp } from '../answering/follow_up.js';
 import { InterfacePanel } from '../interfaces/interface_panel.js';
 import { PerceptionPanel } from '../interfaces/perception_panel.js';
 import { NoReply, unlessLost } from '../page/connection.js';
-import { h, replace, setText } from '../page/dom.js';
+import { h, replace, say, setText } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
-import { Calls } from './calls.js';
+import { callsWords } from './calls.js';
 import { ClaimBar } from './claim_bar.js';
 import { Onlookers } from './onlookers.js';
 import { URGENT_S } from './queue_view.js';
@@ -59,7 +59,7 @@ export class QuestionDetail {
     this.time = h('span', { class: 'time' });
     this.silence = new SilenceBar(app.liveness, question);
     this.onlookers = new Onlookers(app, question);
-    this.calls = new Calls(app, question.key);
+    this.calls = h('p', { class: 'dim calls', hidden: true });
     /** @type {string | null} */
     this.robotGone = null; // how it went, and the question with it; null: it was open until now
     this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
@@ -78,7 +78,7 @@ export class QuestionDetail {
     this.machine.show(question.robot, question.path);
     this.hand.show(question.robot, question.path);
     return h('article', { class: 'detail', 'data-question': question.key }, this.head(),
-      this.silence.root, this.claimBar.root, this.onlookers.root, this.calls.root,
+      this.silence.root, this.claimBar.root, this.onlookers.root, this.calls,
       this.perceptionPlace, this.interfacePlace,
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
@@ -112,6 +112,7 @@ export class QuestionDetail {
     this.showPerception();
     this.showInterface();
     this.onlookers.look();
+    say(this.calls, callsWords(this.app, this.key));
     if (this.app.mayAnswer && this.mine) this.claim('claim'); // by a page of before: keep it
     this.show();
   }
@@ -221,7 +222,7 @@ export class QuestionDetail {
 
   tick() {
     this.showClaim();
-    this.calls.show();
+    say(this.calls, callsWords(this.app, this.key));
     this.hand.update();
   }
 
@@ -313,7 +314,7 @@ export class QuestionDetail {
     }
     if (changed('preconditions')) this.showTime();
     if (changed('onlookers')) this.onlookers.show();
-    if (changed('reach')) this.calls.show();
+    if (changed('reach')) say(this.calls, callsWords(this.app, this.key));
     if (changed('images', 'cameras')) this.camera.update();
     if (changed('sensors')) this.showPerception();
     if (changed('questions')) {

@@ -3,14 +3,14 @@
 import { waits } from '../page/alerts.js';
 import { SETTLING_MS } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
-import { h, modified, replace, setText, typing } from '../page/dom.js';
+import { h, modified, replace, say, setText, typing } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { counted } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { AlikeAnswer } from './alike_answer.js';
-import { Unreached } from './calls.js';
+import { unreachedWords } from './calls.js';
 import { tellPresses } from './presence.js';
 import { QuestionDetail } from './question_detail.js';
 import { QueueTools, queueList } from './queue_view.js';
@@ -42,11 +42,11 @@ class QuestionPanel {
     this.tools = new QueueTools(() => this.showQueue());
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
     this.stage = h('div', { class: 'stage' });
-    this.unreached = new Unreached(app);
+    this.unreached = h('p', { class: 'problem unreached', role: 'status', hidden: true });
     this.servers = h('p', { class: 'dim servers' });
     this.ages = h('p', { class: 'dim servers ages-below' }); // where the top bar is too narrow
     this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.tools.root, this.queue, this.unreached.root,
+      h('aside', { class: 'queue-side' }, this.tools.root, this.queue, this.unreached,
         this.servers, this.ages,
         h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
     this.nextKey = new SettledKey(() => this.next?.key || '');
@@ -117,7 +117,7 @@ class QuestionPanel {
     const focused = this.root.contains(document.activeElement);
     if (names.includes('questions')) this.arrive();
     if (names.includes('servers')) this.showServers();
-    if (names.includes('reach')) this.unreached.show();
+    if (names.includes('reach')) say(this.unreached, unreachedWords(this.app));
     if (names.includes('questions') || names.includes('onlookers')) this.showQueue();
     if (this.detail) this.detail.update(names);
     else {

@@ -3,7 +3,7 @@
 // be drawn as a whole. It follows what fails or is active until a person chooses a state.
 import { h } from '../page/dom.js';
 import { FAILURE_CLASSES, chip, counted, percent, rateBar, times } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { redrawWith } from '../page/redraw.js';
 import { activeIn, focusState } from './focus_state.js';
 
 /**
@@ -20,17 +20,8 @@ export class AroundView {
   /** @param {(path: string) => void} onOpen a nested container was chosen */
   constructor(onOpen) {
     this.onOpen = onOpen;
-    this.before = h('ul', { class: 'ways' });
-    this.state = h('div', { class: 'around-state' });
-    this.after = h('ul', { class: 'ways' });
-    this.follow = h('button', { class: 'tool', title: 'Show what fails or is active',
-      onclick: () => this.choose('') }, 'Follow');
-    this.root = h('div', { class: 'around' },
-      h('section', {}, h('h3', {}, 'Leads here'), this.before),
-      h('section', { class: 'around-middle' }, this.state, this.follow),
-      h('section', {}, h('h3', {}, 'Leads to'), this.after));
+    this.root = h('div', { class: 'around' });
     this.chosen = ''; // by a person; '': it follows
-    this.key = ''; // of what is shown
     this.place = ''; // robot and path
     /** @type {() => void} */
     this.again = () => {};
@@ -56,13 +47,15 @@ export class AroundView {
     this.again = () => this.set(robot, graph, machine);
     if (!graph.states.some(({ label }) => label === this.chosen)) this.chosen = '';
     const label = this.chosen || focusState(graph, machine) || graph.states[0]?.label || '';
-    this.follow.setAttribute('aria-pressed', String(!this.chosen));
-    const key = JSON.stringify([label, graph, machine]);
-    if (key === this.key) return;
-    this.key = key;
-    redraw(this.before, this.rows(waysTo(label, graph, machine), graph));
-    redraw(this.state, stateFacts(robot, label, graph, machine, this.onOpen));
-    redraw(this.after, this.rows(waysFrom(label, graph, machine), graph));
+    redrawWith(this.root, [label, graph, machine, this.chosen], () => [
+      h('section', {}, h('h3', {}, 'Leads here'),
+        h('ul', { class: 'ways' }, this.rows(waysTo(label, graph, machine), graph))),
+      h('section', { class: 'around-middle' }, h('div', { class: 'around-state' },
+        stateFacts(robot, label, graph, machine, this.onOpen)),
+      h('button', { class: 'tool', title: 'Show what fails or is active',
+        'aria-pressed': !this.chosen, onclick: () => this.choose('') }, 'Follow')),
+      h('section', {}, h('h3', {}, 'Leads to'),
+        h('ul', { class: 'ways' }, this.rows(waysFrom(label, graph, machine), graph)))]);
   }
 
   /**

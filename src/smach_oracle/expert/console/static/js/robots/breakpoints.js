@@ -1,43 +1,34 @@
 // @ts-check
 // The states before which a machine pauses.
-import { h, setText } from '../page/dom.js';
-import { redraw } from '../page/redraw.js';
+import { h } from '../page/dom.js';
 
-export class Breakpoints {
-  /** @param {(pattern: string, remove: boolean) => Promise<boolean>} change */
-  constructor(change) {
-    this.change = change;
-    this.key = '';
-    this.title = h('summary', {});
-    this.list = h('div', { class: 'row wrap' });
-    this.field = h('input', { type: 'text', maxlength: 400, spellcheck: false,
-      autocomplete: 'off', 'aria-label': 'Pause before these states',
-      placeholder: 'PICK, PICK_*' });
-    this.form = h('form', { class: 'row', onsubmit: (event) => this.add(event) }, this.field,
-      h('button', { class: 'tool', type: 'submit' }, 'Pause there'));
-    this.root = h('details', { class: 'breakpoints' }, this.title, this.list, this.form);
-  }
+/** @typedef {(pattern: string, remove: boolean) => Promise<boolean>} ChangeBreakpoint */
 
-  /**
-   * @param {string[]} patterns
-   * @param {boolean} may whether they may be changed
-   */
-  show(patterns, may) {
-    const key = JSON.stringify([patterns, may]);
-    if (key === this.key) return;
-    this.key = key;
-    setText(this.title, 'Breakpoints' + (patterns.length ? ' (' + patterns.length + ')' : ''));
-    this.form.hidden = !may;
-    redraw(this.list, patterns.map((pattern) => h('button', { key: pattern,
+/**
+ * @param {string[]} patterns
+ * @param {boolean} may whether they may be changed
+ * @param {ChangeBreakpoint} change
+ */
+export function breakpoints(patterns, may, change) {
+  return h('details', { class: 'breakpoints' },
+    h('summary', {}, 'Breakpoints' + (patterns.length ? ' (' + patterns.length + ')' : '')),
+    h('div', { class: 'row wrap' }, patterns.map((pattern) => h('button', { key: pattern,
       class: 'tool', 'data-breakpoint': pattern, disabled: !may,
       'aria-label': 'Take the breakpoint ' + pattern + ' away',
-      onclick: () => this.change(pattern, true) }, pattern, ' ✕')));
-  }
+      onclick: () => change(pattern, true) }, pattern, ' ✕'))),
+    h('form', { class: 'row', hidden: !may, onsubmit: (event) => add(event, change) },
+      h('input', { type: 'text', maxlength: 400, spellcheck: false, autocomplete: 'off',
+        'aria-label': 'Pause before these states', placeholder: 'PICK, PICK_*' }),
+      h('button', { class: 'tool', type: 'submit' }, 'Pause there')));
+}
 
-  /** @param {Event} event */
-  async add(event) {
-    event.preventDefault();
-    const pattern = this.field.value.trim();
-    if (pattern && await this.change(pattern, false)) this.field.value = '';
-  }
+/**
+ * @param {SubmitEvent} event
+ * @param {ChangeBreakpoint} change
+ */
+async function add(event, change) {
+  event.preventDefault();
+  const field = event.target instanceof Element && event.target.querySelector('input');
+  const pattern = field && field.value.trim();
+  if (field && pattern && await change(pattern, false)) field.value = '';
 }

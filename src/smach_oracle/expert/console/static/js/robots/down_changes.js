@@ -1,6 +1,5 @@
 // @ts-check
 // What may be changed in the store of a machine that is down, before it goes on.
-import { unlessLost } from '../page/connection.js';
 import { h, options, replace, setText, toast } from '../page/dom.js';
 
 /** @typedef {'goto_stored' | 'edit_stored' | 'drop_stored'} Change */
@@ -42,7 +41,10 @@ export class DownChanges {
       this.reply);
   }
 
-  /** @param {server.DownMachine} row */
+  /**
+   * What it is for a row as it is now.
+   * @param {server.DownMachine} row
+   */
   show(row) {
     this.row = row;
     const states = JSON.stringify(row.states);
@@ -70,6 +72,7 @@ export class DownChanges {
     }
     setText(this.why, mayAnswer ? '' : NEEDS_ROLE);
     this.showMeaning();
+    return this.root;
   }
 
   showMeaning() {
@@ -137,14 +140,9 @@ export class DownChanges {
   async send(name, args) {
     setText(this.problem, '');
     setText(this.reply, '');
-    try {
-      const { ok, message } = await this.app.connection.request(name, args);
-      setText(ok ? this.reply : this.problem, message);
-      if (ok && name === 'drop_stored') toast(message, 'good'); // its row goes
-      return ok;
-    } catch (err) {
-      unlessLost(err);
-      return false;
-    }
+    const { ok, message } = await this.app.connection.ask(name, args, '');
+    setText(ok ? this.reply : this.problem, message);
+    if (ok && name === 'drop_stored') toast(message, 'good'); // its row goes
+    return ok;
   }
 }

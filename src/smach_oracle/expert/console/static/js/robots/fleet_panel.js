@@ -2,14 +2,13 @@
 // All robots on one page, those that need a person first. One, several or all are stopped, paused
 // and resumed from here.
 import { unlessLost } from '../page/connection.js';
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { counted } from '../page/format.js';
-import { arrange } from '../page/redraw.js';
-import { FleetCard } from './fleet_card.js';
+import { keep, render, renderWith } from '../page/redraw.js';
+import { fleetCard } from './fleet_card.js';
 import { byNeed, factsOf, needsHelp, resumedWords, robotsOf } from './fleet_facts.js';
 
-/** @typedef {import('./fleet_card.js').FleetOrder} FleetOrder */
 /** @typedef {import('./fleet_facts.js').RobotFacts} RobotFacts */
 
 /** @type {page.Panel} */
@@ -26,114 +25,110 @@ class FleetPanel {
   /** @param {page.App} app */
   constructor(app) {
     this.app = app;
-    /** @type {Map<string, FleetCard>} */
-    this.cards = new Map();
+    /** @type {Set<string>} */
+    this.wanted = new Set(); // robots that a person has chosen
     /** @type {RobotFacts[]} */
     this.facts = [];
+    /** @type {string[]} */
+    this.order = []; // in which they are shown
+    /** @type {Map<string, HTMLElement>} */
+    this.cards = new Map(); // by robot
+    this.reply = { ok: true, message: '' };
     this.touchedAt = this.repliedAt = -Infinity; // ms
     this.timer = 0;
-    this.summary = h('p', { class: 'fleet-summary', role: 'status' });
-    this.reply = h('p', { class: 'fleet-reply', role: 'status' });
-    this.stopAll = this.button('stop', 'all');
-    this.pauseAll = this.button('pause', 'all');
-    this.stopChosen = this.button('stop', 'chosen');
-    this.pauseChosen = this.button('pause', 'chosen');
-    this.resumeWords = h('span', {});
-    this.resumeChosen = h('button', { class: 'go-on-button', 'data-action': 'resume-chosen',
-      onclick: () => this.resume(this.pausedOf(this.chosen)) }, h('strong', {}, 'Resume'),
-    this.resumeWords);
-    this.list = h('div', { class: 'fleet-list' });
-    for (const type of ['pointermove', 'pointerdown', 'keydown']) {
-      this.list.addEventListener(type, () => { this.touchedAt = performance.now(); });
-    }
-    this.empty = h('p', { class: 'empty' }, NO_ROBOTS);
-    this.bar = h('div', { class: 'fleet-bar' },
-      h('div', { class: 'row wrap' }, this.stopAll, this.pauseAll, this.stopChosen,
-        this.pauseChosen, this.resumeChosen), this.summary, this.reply,
-      h('p', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP));
-    this.root = h('div', { class: 'panel fleet' }, this.bar, this.list, this.empty);
-  }
-
-  /**
-   * @param {'stop' | 'pause'} order
-   * @param {'all' | 'chosen'} which
-   */
-  button(order, which) {
-    return h('button', { class: order === 'stop' ? 'stop' : '',
-      'data-action': order + '-' + which,
-      onclick: () => this.hold(order, which === 'all' ? [] : this.chosen.map((f) => f.robot)) });
+    this.root = h('div', {});
   }
 
   /** Those that a person has chosen. */
-  get chosen() { return this.facts.filter(({ robot }) => this.cards.get(robot)?.box.checked); }
+  get chosen() { return this.facts.filter(({ robot }) => this.wanted.has(robot)); }
 
   /** @param {RobotFacts[]} robots */
   pausedOf(robots) { return robots.filter(({ paused }) => paused.length); }
-
-  shown() { this.show(); }
-
-  tick() { this.show(); }
 
   /** @param {string[]} names */
   update(names) {
     if (this.app.current !== 'fleet') return;
     if (names.some((name) => ['robots', 'questions', 'health', 'heard'].includes(name)
-      || name.startsWith('live '))) this.showSoon();
+      || name.startsWith('live '))) this.drawSoon();
   }
 
   /** Robots of a large fleet say something all the time: they are shown a few times a second. */
-  showSoon() {
+  drawSoon() {
     this.timer = this.timer || setTimeout(() => {
       this.timer = 0;
-      this.show();
+      this.draw();
     }, BETWEEN_MS);
   }
 
-  show() {
+  draw() {
     const { app } = this;
     this.facts = byNeed(robotsOf(app).map((robot) => factsOf(app, robot)));
-    for (const facts of this.facts) this.cardOf(facts.robot).show(facts, this.mayResume(facts));
-    this.showList();
-    this.showBar();
+    for (const { robot, holdable, standing } of this.facts) {
+      if (!holdable || standing === 'gone') this.wanted.delete(robot);
+    }
+    this.settle(this.facts.map(({ robot }) => robot));
+    render(this.root, this.view());
   }
 
-  /** The order stays while somebody is at the list: no card slips under a finger. */
-  showList() {
-    const names = this.facts.map(({ robot }) => robot);
-    for (const robot of [...this.cards.keys()]) {
-      if (!names.includes(robot)) this.cards.delete(robot);
-    }
-    const shown = [...this.list.children].flatMap((each) => (
-      each instanceof HTMLElement ? [each.dataset['robot'] || ''] : []));
+  /**
+   * The order stays while somebody is at the list: no card slips under a finger.
+   * @param {string[]} names
+   */
+  settle(names) {
+    for (const robot of this.cards.keys()) if (!names.includes(robot)) this.cards.delete(robot);
     const rests = performance.now() - this.touchedAt > AT_REST_MS;
-    const order = rests ? names : [...shown.filter((robot) => names.includes(robot)),
-      ...names.filter((robot) => !shown.includes(robot))];
-    if (order.join('\n') !== shown.join('\n')) {
-      arrange(this.list, order.map((robot) => this.cardOf(robot).root));
-    }
-    this.empty.hidden = names.length > 0;
-    this.bar.hidden = this.list.hidden = !names.length;
+    this.order = rests ? names : [...this.order.filter((robot) => names.includes(robot)),
+      ...names.filter((robot) => !this.order.includes(robot))];
   }
 
-  showBar() {
+  view() {
+    const none = !this.facts.length;
+    const known = new Map(this.facts.map((facts) => [facts.robot, facts]));
+    const touch = () => { this.touchedAt = performance.now(); };
+    return h('div', { class: 'panel fleet' },
+      h('div', { class: 'fleet-bar', hidden: none }, this.orders(),
+        h('p', { class: 'fleet-summary', role: 'status' }, this.summary()), this.replyLine(),
+        h('p', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP)),
+      h('div', { class: 'fleet-list', hidden: none, onpointermove: touch, onpointerdown: touch,
+        onkeydown: touch }, this.order.map((robot) => known.get(robot)).map((facts) => (
+        facts && this.card(facts)))),
+      h('p', { class: 'empty', hidden: !none }, NO_ROBOTS));
+  }
+
+  summary() {
+    const help = this.facts.filter(needsHelp).length;
+    return counted(this.facts.length, 'robot') + '. '
+      + (help ? counted(help, 'needs', 'need') + ' help.' : 'None needs help.');
+  }
+
+  replyLine() {
+    const { ok, message } = this.reply;
+    const over = performance.now() - this.repliedAt > REPLY_LASTS_MS;
+    return h('p', { class: 'fleet-reply' + (ok ? '' : ' problem'), role: 'status' },
+      !over && message);
+  }
+
+  orders() {
     const { facts, chosen } = this;
     const held = facts.filter(({ holdable, standing }) => holdable && standing !== 'gone');
-    const help = facts.filter(needsHelp);
-    setText(this.summary, counted(facts.length, 'robot') + '. '
-      + (help.length ? counted(help.length, 'needs', 'need') + ' help.' : 'None needs help.'));
-    if (performance.now() - this.repliedAt > REPLY_LASTS_MS) setText(this.reply, '');
-    setText(this.stopAll, '■ Stop all');
-    setText(this.pauseAll, '❚❚ Pause all');
-    this.stopAll.disabled = this.pauseAll.disabled = !held.length;
-    this.stopChosen.hidden = this.pauseChosen.hidden = !chosen.length;
-    setText(this.stopChosen, '■ Stop ' + chosen.length + ' chosen');
-    setText(this.pauseChosen, '❚❚ Pause ' + chosen.length + ' chosen');
     const paused = this.pausedOf(chosen);
     const words = resumedWords(paused);
-    this.resumeChosen.hidden = !paused.length;
-    this.resumeChosen.disabled = !paused.some((each) => this.mayResume(each));
-    this.resumeChosen.dataset['deliberate'] = 'resume ' + words;
-    setText(this.resumeWords, ' ' + paused.length + ' chosen: ' + words + ' will run');
+    const some = chosen.length + ' chosen';
+    const robots = chosen.map(({ robot }) => robot);
+    return h('div', { class: 'row wrap' },
+      h('button', { class: 'stop', 'data-action': 'stop-all', disabled: !held.length,
+        onclick: () => this.hold('stop', []) }, '■ Stop all'),
+      h('button', { 'data-action': 'pause-all', disabled: !held.length,
+        onclick: () => this.hold('pause', []) }, '❚❚ Pause all'),
+      h('button', { class: 'stop', 'data-action': 'stop-chosen', hidden: !chosen.length,
+        onclick: () => this.hold('stop', robots) }, '■ Stop ' + some),
+      h('button', { 'data-action': 'pause-chosen', hidden: !chosen.length,
+        onclick: () => this.hold('pause', robots) }, '❚❚ Pause ' + some),
+      h('button', { class: 'go-on-button', 'data-action': 'resume-chosen', hidden: !paused.length,
+        disabled: !paused.some((each) => this.mayResume(each)),
+        'data-deliberate': 'resume ' + words, onclick: () => this.resume(paused) },
+      h('strong', {}, 'Resume'),
+      h('span', {}, ' ' + paused.length + ' chosen: ' + words + ' will run')));
   }
 
   /** @param {RobotFacts} facts */
@@ -142,23 +137,27 @@ class FleetPanel {
     return app.mayAnswer && app.connection.connected && !app.liveness.whoOf(robot);
   }
 
-  /** @param {string} robot */
-  cardOf(robot) {
-    const known = this.cards.get(robot);
-    if (known) return known;
-    const card = new FleetCard(this.app, robot, (order, name) => this.send(order, name),
-      () => this.showBar());
+  /** @param {RobotFacts} facts */
+  card(facts) {
+    const { robot } = facts;
+    const card = this.cards.get(robot) || h('section', {});
     this.cards.set(robot, card);
-    return card;
+    const chosen = this.wanted.has(robot);
+    const mayResume = this.mayResume(facts);
+    const second = Math.floor(this.app.store.now()); // it says how long ago something was
+    renderWith(card, [facts, chosen, mayResume, second], () => fleetCard(this.app, facts, {
+      chosen, mayResume, choose: () => this.choose(robot),
+      send: (order) => {
+        if (order === 'resume') this.resume([facts]);
+        else this.hold(order, [robot]);
+      } }));
+    return keep(card);
   }
 
-  /**
-   * @param {FleetOrder} order
-   * @param {string} robot
-   */
-  send(order, robot) {
-    if (order === 'resume') this.resume(this.facts.filter((each) => each.robot === robot));
-    else this.hold(order, [robot]);
+  /** @param {string} robot that is chosen from now on, or no longer */
+  choose(robot) {
+    if (!this.wanted.delete(robot)) this.wanted.add(robot);
+    this.draw();
   }
 
   /**
@@ -167,14 +166,9 @@ class FleetPanel {
    * @param {string[]} robots none: all that can be held
    */
   async hold(order, robots) {
-    setText(this.reply, '');
-    try {
-      const command = order === 'stop' ? 'stop_robots' : 'pause_robots';
-      this.tell(await this.app.connection.request(command, { robots }));
-    } catch (err) {
-      unlessLost(err);
-      this.tell({ ok: false, message: CANNOT_STOP });
-    }
+    this.tell({ ok: true, message: '' });
+    const command = order === 'stop' ? 'stop_robots' : 'pause_robots';
+    this.tell(await this.app.connection.ask(command, { robots }, CANNOT_STOP));
   }
 
   /**
@@ -182,7 +176,7 @@ class FleetPanel {
    * @param {RobotFacts[]} robots
    */
   async resume(robots) {
-    setText(this.reply, '');
+    this.tell({ ok: true, message: '' });
     const told = [];
     let ok = true;
     try {
@@ -198,9 +192,9 @@ class FleetPanel {
   }
 
   /** @param {{ ok: boolean, message: string }} reply */
-  tell({ ok, message }) {
-    this.reply.classList.toggle('problem', !ok);
-    setText(this.reply, message);
+  tell(reply) {
+    this.reply = reply;
     this.repliedAt = performance.now();
+    this.draw();
   }
 }

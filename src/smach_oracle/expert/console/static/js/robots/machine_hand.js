@@ -2,11 +2,10 @@
 // Holding a machine: stop it, have it wait, let it go on. To stop and to pause is there for whoever
 // sees the robot, and is sent at once. The two keep their places: what lets a machine go on never
 // lies where they were.
-import { unlessLost } from '../page/connection.js';
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
-import { redraw } from '../page/redraw.js';
-import { Breakpoints } from './breakpoints.js';
+import { keep, redrawWith, render } from '../page/redraw.js';
+import { breakpoints } from './breakpoints.js';
 import { byContainer, listed, machineOf, resumable, standingWords, waiting } from './hand_words.js';
 
 /** @typedef {'stop_machine' | 'pause_machine'} Stop */
@@ -15,6 +14,7 @@ import { byContainer, listed, machineOf, resumable, standingWords, waiting } fro
 const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
 const REPLY_LASTS_MS = 20000; // it is of the past then
 const NEEDS_ROLE = 'To let it go on needs the role of an operator.';
+const NOTHING = { to: '', at: 0, ok: true, message: '' };
 
 export class MachineHand {
   /** @param {page.App} app */
@@ -22,24 +22,9 @@ export class MachineHand {
     this.app = app;
     this.robot = '';
     this.path = '';
-    this.key = ''; // of what may let it go on
-    this.stopButton = h('button', { class: 'stop', 'data-action': 'stop-machine',
-      title: 'Ask the machine to stop: it is preempted',
-      onclick: () => this.send('stop_machine', this.machine?.path || '') });
-    this.pauseButton = h('button', { 'data-action': 'pause-machine',
-      title: 'What runs goes on to its end; then the machine waits',
-      onclick: () => this.send('pause_machine', this.machine?.path || '') }, '❚❚ Pause');
-    this.standing = h('p', { class: 'standing', role: 'status' });
+    this.replied = NOTHING; // to which command, and when (ms)
     this.goOn = h('div', { class: 'row wrap go-on' });
-    this.reply = h('p', { class: 'dim hand-reply', role: 'status' });
-    this.replied = { to: '', at: 0 }; // the command, and when (ms)
-    this.problem = h('p', { class: 'problem', role: 'alert' });
-    this.breakpoints = new Breakpoints((pattern, remove) => this.breakAt(pattern, remove));
-    this.root = h('section', { class: 'machine-hand', 'aria-label': 'Stop or hold the machine' },
-      h('div', { class: 'row wrap' }, this.stopButton, this.pauseButton, this.standing),
-      this.goOn, this.problem, this.reply,
-      h('div', { class: 'row wrap hand-foot' }, this.breakpoints.root,
-        h('span', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP)));
+    this.root = h('section', { hidden: true });
   }
 
   /**
@@ -59,23 +44,43 @@ export class MachineHand {
     const robotBefore = this.robot;
     this.robot = robot;
     this.path = path;
-    if (robot !== robotBefore || before !== this.machine?.path) {
-      setText(this.reply, '');
-      setText(this.problem, '');
-    }
+    if (robot !== robotBefore || before !== this.machine?.path) this.replied = NOTHING;
     this.update();
   }
 
   update() {
     const { machine } = this;
+    if (machine) {
+      this.showGoOn(machine);
+      render(this.root, this.view(machine));
+    }
     this.root.hidden = !machine;
-    if (!machine) return;
-    setText(this.stopButton, '■ Stop ' + machine.path);
-    setText(this.standing, standingWords(machine, this.robot, this.app.store));
-    if (this.replyIsOver(machine)) setText(this.reply, '');
-    this.root.classList.toggle('held', machine.paused || waiting(machine).length > 0);
-    this.showGoOn(machine);
-    this.breakpoints.show(machine.breakpoints, this.app.mayAnswer);
+  }
+
+  /** @param {server.HeldMachine} machine */
+  view(machine) {
+    const { path, paused } = machine;
+    const { ok, message } = this.replied;
+    const held = paused || waiting(machine).length > 0;
+    return h('section', { class: 'machine-hand' + (held ? ' held' : ''),
+      'aria-label': 'Stop or hold the machine' },
+    h('div', { class: 'row wrap' },
+      h('button', { class: 'stop', 'data-action': 'stop-machine',
+        title: 'Ask the machine to stop: it is preempted',
+        onclick: () => this.send('stop_machine', { path }) }, '■ Stop ' + path),
+      h('button', { 'data-action': 'pause-machine',
+        title: 'What runs goes on to its end; then the machine waits',
+        onclick: () => this.send('pause_machine', { path }) }, '❚❚ Pause'),
+      h('p', { class: 'standing', role: 'status' },
+        standingWords(machine, this.robot, this.app.store))),
+    keep(this.goOn),
+    h('p', { class: 'problem', role: 'alert' }, !ok && message),
+    h('p', { class: 'dim hand-reply', role: 'status' },
+      ok && !this.replyIsOver(machine) && message),
+    h('div', { class: 'row wrap hand-foot' },
+      breakpoints(machine.breakpoints, this.app.mayAnswer,
+        (pattern, remove) => this.send('set_breakpoint', { path, pattern, remove })),
+      h('span', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP)));
   }
 
   /**
@@ -91,19 +96,17 @@ export class MachineHand {
   showGoOn(machine) {
     const { app, robot } = this;
     const may = app.mayAnswer && app.connection.connected && !app.liveness.whoOf(robot);
-    const key = JSON.stringify([robot, machine.path, machine.paused, machine.active, may]);
-    if (key === this.key) return;
-    this.key = key;
     const waits = waiting(machine);
     const asks = waits.filter(({ confirm }) => confirm);
-    redraw(this.goOn, machine.paused && this.button('resume_machine', machine.path, 'Resume',
-      listed(resumable(machine)), may),
-    byContainer(waits).map(([path, states]) => (
-      this.button('step_machine', path, 'Step', listed(states), may))),
-    byContainer(asks).map(([path, states]) => (
-      this.button('confirm_state', path, 'Confirm', listed(states), may))),
-    (machine.paused || waits.length > 0) && !app.mayAnswer
-      && h('span', { key: 'role', class: 'dim' }, NEEDS_ROLE));
+    redrawWith(this.goOn, [robot, machine, may], () => [
+      machine.paused && this.button('resume_machine', machine.path, 'Resume',
+        listed(resumable(machine)), may),
+      byContainer(waits).map(([path, states]) => (
+        this.button('step_machine', path, 'Step', listed(states), may))),
+      byContainer(asks).map(([path, states]) => (
+        this.button('confirm_state', path, 'Confirm', listed(states), may))),
+      (machine.paused || waits.length > 0) && !app.mayAnswer
+        && h('span', { key: 'role', class: 'dim' }, NEEDS_ROLE)]);
   }
 
   /**
@@ -118,59 +121,27 @@ export class MachineHand {
     return h('button', { key: [this.robot, command, path].join(' '), class: 'go-on-button',
       'data-action': action, disabled: !may,
       'data-deliberate': [command, this.robot, path, runs].join(' '),
-      onclick: () => this.send(command, path) },
+      onclick: () => this.send(command, { path }) },
     h('strong', {}, word), runs && ': ' + runs + ' will run');
   }
 
   /**
-   * @param {Stop | Start} command
-   * @param {string} path
+   * Whether it was done. What a robot answers is not shown once another one is.
+   * @template {Stop | Start | 'set_breakpoint'} Name
+   * @param {Name} to
+   * @param {Omit<server.Commands[Name], 'robot'>} args
    */
-  async send(command, path) {
-    setText(this.problem, '');
-    setText(this.reply, '');
-    const { robot } = this;
-    try {
-      const reply = await this.app.connection.request(command, { robot, path });
-      this.tell(robot, command, reply);
-    } catch (err) {
-      unlessLost(err);
-      if (command === 'stop_machine' || command === 'pause_machine') {
-        this.tell(robot, command, { ok: false, message: CANNOT_STOP });
-      }
-    }
-  }
-
-  /**
-   * @param {string} pattern
-   * @param {boolean} remove
-   */
-  async breakAt(pattern, remove) {
-    setText(this.problem, '');
-    setText(this.reply, '');
-    const { robot, machine } = this;
-    try {
-      const reply = await this.app.connection.request('set_breakpoint', { robot, pattern, remove,
-        path: machine?.path || '' });
-      this.tell(robot, 'set_breakpoint', reply);
-      return reply.ok;
-    } catch (err) {
-      unlessLost(err);
-      return false;
-    }
-  }
-
-  /**
-   * What a robot has answered, unless another one is shown by now.
-   * @param {string} robot
-   * @param {string} command
-   * @param {{ ok: boolean, message: string }} reply
-   */
-  tell(robot, command, { ok, message }) {
-    if (robot !== this.robot) return;
-    this.replied = { to: command, at: performance.now() };
-    setText(this.reply, ok ? message : '');
-    setText(this.problem, ok ? '' : message);
+  async send(to, args) {
+    this.replied = NOTHING;
     this.update();
+    const { robot } = this;
+    const stops = to === 'stop_machine' || to === 'pause_machine';
+    const { ok, message } = await this.app.connection.ask(to,
+      /** @type {server.Commands[Name]} */ ({ robot, ...args }), stops ? CANNOT_STOP : '');
+    if (robot === this.robot) {
+      this.replied = { to, at: performance.now(), ok, message };
+      this.update();
+    }
+    return ok;
   }
 }

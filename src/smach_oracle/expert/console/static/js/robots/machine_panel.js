@@ -1,8 +1,8 @@
 // @ts-check
 // All containers of all robots: one of them is shown, live.
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { aged } from '../page/liveness.js';
-import { arrange, redraw } from '../page/redraw.js';
+import { keep, redrawWith, render } from '../page/redraw.js';
 import { takeArrowKeys } from '../page/tree_keys.js';
 import { DownList } from './down_list.js';
 import { MachineHand } from './machine_hand.js';
@@ -38,15 +38,8 @@ class MachinePanel {
     this.picker = h('div', { class: 'picker', role: 'tree',
       'aria-label': 'Robots and their machines' });
     takeArrowKeys(this.picker);
-    this.pickerKey = ''; // of what it shows
-    this.title = h('h2', { class: 'ellipsis' });
-    this.state = h('span', { class: 'dim ellipsis' });
-    this.body = h('section', { class: 'card machine-card' },
-      h('div', { class: 'row head' }, this.title, this.state), this.hand.root, this.view.root,
-      legend());
-    this.root = h('div', { class: 'panel machines' }, this.picker, this.body);
     this.down = new DownList(app);
-    this.empty = h('p', { class: 'empty' }, NO_ROBOTS);
+    this.root = h('div', {});
   }
 
   /**
@@ -58,7 +51,7 @@ class MachinePanel {
     this.path = path;
     this.picked = true;
     this.wanted = '';
-    this.show();
+    this.draw();
     this.app.went();
   }
 
@@ -72,37 +65,37 @@ class MachinePanel {
       this.robot = '';
       this.path = '';
     }
-    this.show();
+    this.draw();
   }
 
-  shown() { this.show(); }
+  get sections() { return /^(?:robots|questions|down|live .*|graph .*)$/; }
 
-  tick() { this.show(); }
-
-  /** @param {string[]} names */
-  update(names) {
-    if (names.some((name) => name === 'robots' || name === 'questions'
-      || name === 'down' || name.startsWith('live ')
-      || name.startsWith('graph '))) this.show();
-  }
-
-  show() {
+  draw() {
     const robots = (this.app.store.get('robots') || []).filter((robot) => this.paths(robot).length);
     this.settle(robots);
-    this.down.show();
-    arrange(this.root, robots.length ? [this.picker, this.body, this.down.root]
-      : [this.empty, this.down.root]);
-    this.showPicker(robots);
-    setText(this.title, this.path || this.robot);
-    const { alive, unwell } = this.source.state(this.robot);
-    const { liveness } = this.app;
-    const age = alive === false ? null : liveness.robot(this.robot);
-    this.body.classList.toggle('silent', alive === false || liveness.isSilent(this.robot));
-    setText(this.state, this.robot + (alive === false ? ' · gone' : '')
-      + (age === null ? '' : ' · heard ' + aged(age) + ' ago')
-      + (unwell ? ' · waits until it is well: ' + unwell : ''));
+    this.down.draw();
+    const groups = robots.map((robot) => this.pickerGroup(robot));
+    redrawWith(this.picker, groups, () => groups.map((group) => this.pickerView(group)));
     if (this.robot) this.view.show(this.robot, this.path);
     this.hand.show(this.robot, this.path);
+    render(this.root, h('div', { class: 'panel machines' },
+      robots.length ? [keep(this.picker), this.machineCard()]
+        : h('p', { class: 'empty' }, NO_ROBOTS), keep(this.down.root)));
+  }
+
+  machineCard() {
+    const { robot, path } = this;
+    const { alive, unwell } = this.source.state(robot);
+    const { liveness } = this.app;
+    const gone = alive === false;
+    const age = gone ? null : liveness.robot(robot);
+    return h('section', { class: 'card machine-card'
+      + (gone || liveness.isSilent(robot) ? ' silent' : '') },
+    h('div', { class: 'row head' }, h('h2', { class: 'ellipsis' }, path || robot),
+      h('span', { class: 'dim ellipsis' }, robot + (gone ? ' · gone' : '')
+        + (age === null ? '' : ' · heard ' + aged(age) + ' ago')
+        + (unwell ? ' · waits until it is well: ' + unwell : ''))),
+    keep(this.hand.root), keep(this.view.root), legend());
   }
 
   /**
@@ -131,16 +124,11 @@ class MachinePanel {
   /** @param {string} robot */
   paths(robot) { return this.source.state(robot).paths; }
 
-  /** @param {string[]} robots */
-  showPicker(robots) {
-    const groups = robots.map((robot) => this.pickerGroup(robot));
-    const key = JSON.stringify(groups);
-    if (key === this.pickerKey) return;
-    this.pickerKey = key;
-    redraw(this.picker, groups.map(({ robot, alive, rows }) => (
-      h('div', { key: robot, class: 'group', role: 'group', 'aria-label': robot },
-        h('div', { class: 'robot' + (alive ? '' : ' gone') }, h('span', { class: 'dot' }), robot),
-        rows.map((row) => this.pickerButton(robot, row))))));
+  /** @param {PickerGroup} group */
+  pickerView({ robot, alive, rows }) {
+    return h('div', { key: robot, class: 'group', role: 'group', 'aria-label': robot },
+      h('div', { class: 'robot' + (alive ? '' : ' gone') }, h('span', { class: 'dot' }), robot),
+      rows.map((row) => this.pickerButton(robot, row)));
   }
 
   /**

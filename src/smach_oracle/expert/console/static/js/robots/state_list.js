@@ -2,7 +2,7 @@
 // A container as a list of its states: for where there is no drawing, and for who prefers it.
 import { h } from '../page/dom.js';
 import { FAILURE_CLASSES, chip, percent, rateBar } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { redrawWith } from '../page/redraw.js';
 import { activeIn, focusState } from './focus_state.js';
 
 const TITLES = ['State', 'Failure rate', 'Class', 'Ok / failed', 'Leads to'];
@@ -12,7 +12,6 @@ export class StateList {
   constructor(onOpen) {
     this.onOpen = onOpen;
     this.body = h('tbody', {});
-    this.key = ''; // of what is shown
     this.seen = ''; // the state that was brought into view
     const titles = TITLES.map((title) => h('th', { scope: 'col' }, title));
     this.root = h('div', { class: 'table-frame' }, h('table', { class: 'states' },
@@ -27,13 +26,10 @@ export class StateList {
    */
   set(robot, graph, machine, wanted = () => true) {
     const states = graph.states.filter(({ label }) => wanted(label));
-    const key = JSON.stringify([robot, graph, machine, states]);
-    if (key === this.key) return;
-    this.key = key;
     const place = robot + '/' + graph.path + '/';
-    redraw(this.body, states.map(({ label, nested }) => (
-      this.row(place + label, label, nested, graph, machine))));
-    this.bringIntoView(place, focusState(graph, machine));
+    const other = redrawWith(this.body, [robot, graph, machine, states], () => (
+      states.map(({ label, nested }) => this.row(place + label, label, nested, graph, machine))));
+    if (other) this.bringIntoView(place, focusState(graph, machine));
   }
 
   /**

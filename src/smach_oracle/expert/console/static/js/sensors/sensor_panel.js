@@ -4,7 +4,7 @@
 import { h } from '../page/dom.js';
 import { breakable } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
-import { arrange, redraw } from '../page/redraw.js';
+import { arrange, redrawWith } from '../page/redraw.js';
 import { CameraView } from './camera_view.js';
 import { CloudView } from './cloud_view.js';
 import { JointsView } from './joints_view.js';
@@ -36,25 +36,18 @@ class SensorPanel {
     this.stage = h('div', { class: 'sensor-stage' });
     this.root = h('div', { class: 'panel sensors' }, this.list, this.stage);
     this.wanted = remembered('sensors', '').split('\n').filter(Boolean); // names
-    this.shape = '';
-    this.showList();
+    this.draw();
   }
 
   get known() { return this.app.store.sensors; }
 
-  shown() { this.showList(); }
+  get sections() { return /^sensors$/; }
 
-  /** @param {string[]} names */
-  update(names) { if (names.includes('sensors')) this.showList(); }
-
-  showList() {
+  draw() {
     const { known } = this;
-    const shape = JSON.stringify([known, this.wanted]);
-    if (shape === this.shape) return;
-    this.shape = shape;
-    redraw(this.list, known.length ? KINDS.map((kind) => (
+    if (!redrawWith(this.list, [known, this.wanted], () => (known.length ? KINDS.map((kind) => (
       this.group(TITLES[kind], known.filter((each) => each.kind === kind))))
-      : h('p', { class: 'dim' }, 'No sensors yet.'));
+      : h('p', { class: 'dim' }, 'No sensors yet.')))) return;
     for (const sensor of known) {
       const name = nameOf(sensor);
       if (this.wanted.includes(name) && !this.views.has(name)) this.open(sensor);
@@ -90,7 +83,7 @@ class SensorPanel {
       while (this.wanted.length > MOST_VIEWS) this.close(this.wanted[0]);
     }
     remember('sensors', this.wanted.join('\n'));
-    this.showList();
+    this.draw();
   }
 
   /** @param {server.Sensor} sensor */

@@ -3,7 +3,7 @@
 // known by the server's number alone.
 import { h } from '../page/dom.js';
 import { counted } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { redrawWith } from '../page/redraw.js';
 
 const LOST = 'The connection was lost; choose the trial again.';
 
@@ -19,7 +19,6 @@ export class RecordedTrials {
     this.opened = null;
     this.problem = '';
     this.wanted = -1; // number of the trial that is being opened
-    this.key = ''; // of what is shown
     this.root = h('div', { class: 'bag-notes', hidden: true });
   }
 
@@ -38,15 +37,11 @@ export class RecordedTrials {
   update() {
     const { overview } = this;
     const { note, broken, waiting } = overview || { note: '', broken: [], waiting: 0 };
-    const key = JSON.stringify([note, broken, waiting]);
-    if (key === this.key) return;
-    this.key = key;
     this.root.hidden = !this.hasNotes;
-    if (!this.hasNotes) return;
-    redraw(this.root,
+    redrawWith(this.root, [note, broken, waiting], () => [
       waiting > 0 && h('p', { class: 'dim', role: 'status' },
         'Reading bags: ' + waiting + (waiting === 1 ? ' is' : ' are') + ' still to be read.'),
-      note && h('p', { class: 'dim' }, note), broken.length > 0 && brokenBags(broken));
+      note && h('p', { class: 'dim' }, note), broken.length > 0 && brokenBags(broken)]);
   }
 
   /** @param {number} number */

@@ -2,6 +2,7 @@
 // A question of a trial that is replayed, its answer, and what cameras gave when it was put.
 import { h, replace } from '../page/dom.js';
 import { chip } from '../page/format.js';
+import { keep, redrawWith } from '../page/redraw.js';
 import { FailureImageView } from '../sensors/failure_image_view.js';
 
 export class ReplayQuestion {
@@ -9,7 +10,6 @@ export class ReplayQuestion {
   constructor(app) {
     this.app = app;
     this.root = h('div', { class: 'replay-question', hidden: true });
-    this.key = 'null'; // of what is shown
     /** @type {server.KeptImage[]} */
     this.images = [];
     this.imagesRoot = h('div', { class: 'replay-images' });
@@ -20,17 +20,14 @@ export class ReplayQuestion {
    * @param {server.KeptImage[]} images
    */
   show(question, images) {
-    const key = JSON.stringify(question);
-    if (key === this.key) return;
-    this.key = key;
     this.root.hidden = !question;
     if (!question) return;
     const { state, reason, holder, steps, answer } = question;
-    replace(this.root, h('div', { class: 'replay-words-of-question' },
+    redrawWith(this.root, question, () => [h('div', { class: 'replay-words-of-question' },
       h('p', {}, h('strong', {}, 'Question about ', state), reason && ': ' + reason,
         holder && !answer && [' ', chip(holder + ' works on it', 'warn')]),
       steps.map((step) => h('p', { class: 'dim' }, step)), answerOf(question)),
-    this.showImages(images));
+    this.showImages(images)]);
   }
 
   /**
@@ -43,7 +40,7 @@ export class ReplayQuestion {
       this.images = images;
       replace(this.imagesRoot, images.map((image) => new FailureImageView(this.app, image).root));
     }
-    return this.imagesRoot;
+    return keep(this.imagesRoot);
   }
 }
 

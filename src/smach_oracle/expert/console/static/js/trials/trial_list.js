@@ -2,7 +2,7 @@
 // The trials to choose from: those that this server has heard of, then those of bags, by days.
 import { h } from '../page/dom.js';
 import { chip, clock, counted, duration } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { redrawWith } from '../page/redraw.js';
 
 /** @type {{ [ending in server.Trial['ending']]: string }} */
 const ENDINGS = { success: 'good', failure: 'bad', other: 'warn', preempted: 'warn',
@@ -47,7 +47,6 @@ export class TrialList {
    */
   constructor(onChoose, onFilter) {
     this.onChoose = onChoose;
-    this.key = ''; // of what is shown
     this.list = h('div', { class: 'trial-list', role: 'group', 'aria-label': 'Trials' });
     this.filter = h('select', { class: 'trial-filter', 'aria-label': 'Which trials are listed',
       onchange: onFilter }, Object.entries(FILTERS).map(([name, filter]) => (
@@ -60,16 +59,15 @@ export class TrialList {
    * @param {string} chosen
    */
   show(all, chosen) {
-    const key = JSON.stringify([all, chosen, this.filter.value]);
-    if (key === this.key) return;
-    this.key = key;
-    const wanted = all.filter((trial) => FILTERS[this.filter.value]?.fits(trial));
-    const heard = wanted.filter((trial) => !isOfBag(trial));
-    const days = groupedByDay(wanted.filter(isOfBag));
-    redraw(this.list, heard.map((trial) => this.row(trial, chosen)),
-      days.map(({ day, trials }) => [h('h2', { class: 'trial-day' }, 'Bags of ', day),
-        trials.map((trial) => this.row(trial, chosen))]),
-      !wanted.length && h('p', { class: 'dim' }, 'None.'));
+    redrawWith(this.list, [all, chosen, this.filter.value], () => {
+      const wanted = all.filter((trial) => FILTERS[this.filter.value]?.fits(trial));
+      const heard = wanted.filter((trial) => !isOfBag(trial));
+      const days = groupedByDay(wanted.filter(isOfBag));
+      return [heard.map((trial) => this.row(trial, chosen)),
+        days.map(({ day, trials }) => [h('h2', { class: 'trial-day' }, 'Bags of ', day),
+          trials.map((trial) => this.row(trial, chosen))]),
+        !wanted.length && h('p', { class: 'dim' }, 'None.')];
+    });
   }
 
   /**

@@ -3,7 +3,7 @@
 // replayed.
 import { h, replace, setText } from '../page/dom.js';
 import { clock } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { redrawWith } from '../page/redraw.js';
 import { countsTable } from './counts_table.js';
 import { EventLog } from './event_log.js';
 import { RecordedTrials } from './recorded_trials.js';
@@ -39,7 +39,6 @@ class TrialPanel {
     this.follows = true; // the newest trial is shown, until a person chooses
     /** @type {server.TrialEvent[]} */
     this.events = [];
-    this.tableKey = ''; // of what it shows
     this.table = h('div', { class: 'table-frame card trial-counts' });
     this.list = new TrialList((id) => this.choose(id), () => this.update(['trials']));
     this.replay = new TrialReplay(app, (event) => this.log.mark(event.seq));
@@ -181,12 +180,10 @@ class TrialPanel {
   showTable() {
     const heard = this.app.store.get('trials')?.table || [];
     const bags = this.recorded.table;
-    const key = JSON.stringify([heard, bags]);
-    if (key === this.tableKey) return;
-    this.tableKey = key;
     this.table.hidden = !heard.length && !bags.length;
-    redraw(this.table, heard.length > 0 && countsTable(HEARD, heard),
-      bags.length > 0 && countsTable(IN_BAGS, bags));
+    redrawWith(this.table, [heard, bags], () => [
+      heard.length > 0 && countsTable(HEARD, heard),
+      bags.length > 0 && countsTable(IN_BAGS, bags)]);
   }
 
   /** @param {server.Trial} trial */

@@ -3,6 +3,7 @@
 // happened in words.
 import { h, modified, options, replace, setText, typing } from '../page/dom.js';
 import { added, chip } from '../page/format.js';
+import { redraw } from '../page/redraw.js';
 import { MachineView } from '../robots/machine_view.js';
 import { MachineHistory, activePath, machineStateOf } from './machine_history.js';
 import { ReplayControls } from './replay_controls.js';
@@ -42,7 +43,6 @@ export class TrialReplay {
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
     this.view = new MachineView(source, (path) => this.open(path));
     this.path = h('div', { class: 'chips replay-path', 'aria-label': 'What is active' });
-    this.pathKey = '';
     this.words = h('p', { class: 'replay-words', role: 'status' });
     this.question = new ReplayQuestion(app);
     this.container = h('select', { class: 'replay-container', 'aria-label': 'Machine that is shown',
@@ -161,10 +161,7 @@ export class TrialReplay {
    * @param {replay.Snapshot} now
    */
   showPath(active, { failed }) {
-    const key = JSON.stringify([active, failed]);
-    if (key === this.pathKey) return;
-    this.pathKey = key;
-    replace(this.path, active.length ? active.map(([path, label], index) => [
+    redraw(this.path, active.length ? active.map(([path, label], index) => [
       index > 0 && h('span', { class: 'dim' }, '›'),
       chip(label, failed[path] ? 'bad' : 'accent', path + '/' + label),
     ]) : h('span', { class: 'dim' }, 'Nothing is active.'));
