@@ -8,7 +8,7 @@ recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves 
 """
 
 import functools
-from typing import Any, Mapping, NamedTuple, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, NamedTuple, Optional, Sequence
 
 import rospy
 
@@ -23,7 +23,6 @@ from smach_oracle.oracle.settings.health import HealthFunction
 from smach_oracle.oracle.settings.names import Nested, Strictness
 from smach_oracle.oracle.settings.settings import PreconditionLists, Settings
 
-from .attachment import attachments
 from .expert.failure_text import describe_failure
 from .loaded_settings import (
     DEFAULT_PARAM,
@@ -36,6 +35,9 @@ from .log.said_once import SaidOnce
 from .machine_names import machine_names
 from .main_thread import outside_main_thread
 from .reading.known_names import Complaint
+
+if TYPE_CHECKING:
+    from .attachment import Attachments
 
 
 class _GivenSettings(NamedTuple):
@@ -132,19 +134,27 @@ class OracleContainer(BareContainer):
         if not oracle.is_top or self.is_running() or oracle.is_parents:
             return super().execute(*args, **kwargs)
         oracle.describe_failure = describe_failure
-        with attachments().refusing(), machine_names().running(self):
-            if not (attachments().has(self) or attachments().has_parents_node):
+        attachments = _attachments()
+        with attachments.refusing(), machine_names().running(self):
+            if not (attachments.has(self) or attachments.has_parents_node):
                 self._attach()
-            with attachments().trial(self):
+            with attachments.trial(self):
                 return super().execute(*args, **kwargs)
 
     def _attach(self) -> None:
         try:
             take_parameters(self)
-            outside_main_thread(functools.partial(attachments().attach, self))
+            outside_main_thread(functools.partial(_attachments().attach, self))
         except rospy.ROSInterruptException as err:
             # as a bare machine, it runs and finds the shutdown itself
             rospy.logwarn('%s is not attached to its node: %s', oracle_of(self).path, err)
+
+
+def _attachments() -> 'Attachments':
+    """Return those of this process. A program that executes no machine does not import them."""
+    from .attachment import attachments
+
+    return attachments()
 
 
 def checked(settings: SettingsLike, preconditions: PreconditionLists = None) -> Settings:

@@ -25,7 +25,8 @@ def loaded_by(line):
     told = subprocess.run(
         [sys.executable, '-c', LOADED.format(line)], check=True, stdout=subprocess.PIPE, timeout=60
     )
-    return {name.split('._')[1] for name in told.stdout.decode().split()}
+    # before it stands what smach logs
+    return {name.split('._')[1] for name in told.stdout.decode().splitlines()[-1].split()}
 
 
 def test_a_message_brings_in_itself_and_what_it_consists_of():
@@ -37,10 +38,34 @@ def test_a_message_brings_in_itself_and_what_it_consists_of():
     assert loaded_by('from smach_oracle.srv import PassTimeResponse') == {'PassTime'}
 
 
-def test_the_oracle_brings_in_none_of_the_simulated_robot():
-    loaded = loaded_by('from smach_oracle import OracleContainer')
+EXECUTED = """
+import smach
+from smach_oracle import OracleContainer
+machine = smach.StateMachine(['succeeded'])
+with machine:
+    smach.StateMachine.add('A', smach.CBState(lambda data: 'succeeded', outcomes=['succeeded']))
+OracleContainer.wrap(machine).execute()
+"""
+LIBRARIES = """
+import sys
+from smach_oracle import OracleContainer
+libraries = {'actionlib', 'sensor_msgs', 'smach_msgs'}
+print(OracleContainer.__name__, *libraries.intersection(sys.modules))
+"""
+
+
+def test_a_machine_that_is_executed_brings_in_none_of_the_simulated_robot():
+    loaded = loaded_by(EXECUTED)
     assert 'OracleEvent' in loaded and len(loaded) < 60
     assert not loaded & {'PickAction', 'DetectDrinkAction', 'ResetWorld'}
+
+
+def test_the_oracle_alone_brings_in_no_message_and_no_action():
+    assert loaded_by('from smach_oracle import OracleContainer; OracleContainer') == set()
+    told = subprocess.run(
+        [sys.executable, '-c', LIBRARIES], check=True, stdout=subprocess.PIPE, timeout=60
+    )
+    assert told.stdout.decode().split() == ['OracleContainer']
 
 
 @pytest.mark.parametrize('name', MESSAGES)
