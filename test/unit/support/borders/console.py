@@ -58,6 +58,7 @@ _ARGUMENTS: Dict[str, Any] = {
     ),
     'outcome': words('succeeded'),
     'robot': words('/robot'),
+    'robots': st.lists(words('/robot', '/other'), max_size=2),
     'path': words('', 'task'),
     'pattern': words('A'),
     'remove': st.booleans(),
@@ -78,7 +79,8 @@ def _command(name: str) -> Any:
     return mapping_of(fields, sorted(fields))
 
 
-_commands = st.sampled_from(sorted(COMMANDS)).flatmap(_command).map(json.dumps)
+# all of them at once: an argument that is missing above shows whatever is drawn
+_commands = st.one_of([_command(name) for name in sorted(COMMANDS)]).map(json.dumps)
 _messages = st.one_of(_commands, _commands, _commands, json_texts, st.binary(max_size=40))
 
 
