@@ -15,6 +15,7 @@ from smach_oracle.expert.console.page_socket import OpenPages
 from smach_oracle.expert.console.people.people import People
 from smach_oracle.expert.console.people.shift_journal import ShiftJournal
 from smach_oracle.expert.console.sensors.question_images import ImageStore
+from smach_oracle.expert.console.sensors.question_replays import QuestionReplays
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStreams
 from smach_oracle.expert.console.server import make_app, tls_context
 from smach_oracle.expert.console.trials.bag_catalogue import BagCatalogue
@@ -142,9 +143,14 @@ class ConsoleCase(tornado.testing.AsyncHTTPTestCase):
         self.sensors = SensorStreams()
         self.files = ImageStore()
         self.catalogue = BagCatalogue(self.folders(), self.sections)
+        self.replays = QuestionReplays()
         recorded = RecordedTrials(self.catalogue, LayoutWorker(), self.files)
         return make_app(
-            self.access, self.pages, self.sensors, HistoryRequests(recorded, self.files)
+            self.access,
+            self.pages,
+            self.sensors,
+            HistoryRequests(recorded, self.files),
+            replays=self.replays,
         )
 
     def folders(self):

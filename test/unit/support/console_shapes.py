@@ -13,7 +13,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from expert_fixtures import make_question
 from fake_trials import play
 from geometry_msgs.msg import PointStamped, Vector3
-from sensor_msgs.msg import BatteryState, JointState
+from sensor_msgs.msg import BatteryState, CompressedImage, JointState
 from std_msgs.msg import Header
 
 from smach_oracle.analysis.graphs.container_graph import (
@@ -50,6 +50,7 @@ from smach_oracle.expert.console.robots.followed_robot import FollowedRobot
 from smach_oracle.expert.console.robots.robot_health import RobotHealth
 from smach_oracle.expert.console.sensors import sample_handlers
 from smach_oracle.expert.console.sensors.question_images import QuestionImage, image_view
+from smach_oracle.expert.console.sensors.question_replays import kept_replay
 from smach_oracle.expert.console.sensors.robot_appearance import RobotAppearance
 from smach_oracle.expert.console.sensors.robot_cameras import RobotCameras
 from smach_oracle.expert.console.sensors.sensor_streams import SensorStream, SensorStreams
@@ -64,6 +65,7 @@ from smach_oracle.msg import (
     ActiveState,
     ConsoleCommand,
     ControlStatus,
+    FailureReplay,
     InterfaceOutput,
     MachineControl,
     OpenQuery,
@@ -161,6 +163,27 @@ def put_questions(sections):
         'images',
         {KEY: [image_view(QuestionImage(1, '/camera', late_s, 4, 4)) for late_s in (None, 1.5)]},
     )
+    sections.put('replays', {KEY: 1})
+
+
+def replay():
+    """A replay with an image, an event and a joint."""
+    now = rospy.Time(100)
+    event = OracleEvent(kind=OracleEvent.FAILURE, header=Header(stamp=now), state='PICK')
+    joints = JointState(name=['elbow'], position=[0.5])
+    return kept_replay(
+        FailureReplay(
+            header=Header(stamp=now),
+            seconds=30.0,
+            topics=['/camera'],
+            cameras=b'\0',
+            images_came=[now],
+            images=[CompressedImage()],
+            joints_came=[now],
+            joints=[joints],
+            events=[event],
+        )
+    ).view
 
 
 def put_reach(sections):

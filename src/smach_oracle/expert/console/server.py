@@ -45,6 +45,8 @@ from .robots.machine_hand import MachineHand
 from .robots.robot_health import RobotHealth
 from .sensors.images import NO_PICTURES, cv2
 from .sensors.question_images import ImageStore, QuestionImages
+from .sensors.question_replays import QuestionReplays
+from .sensors.replay_handlers import ReplayFrameHandler, ReplayHandler, ReplayRequests
 from .sensors.robot_clocks import ImageAges, RobotClocks
 from .sensors.sample_handlers import RobotAppearanceHandler, SampleHandler, SensorRequests
 from .sensors.sensor_streams import SensorStreams
@@ -75,9 +77,11 @@ def make_app(
     sensors: SensorStreams,
     history: HistoryRequests,
     ages: Optional[ImageAges] = None,
+    replays: Optional[QuestionReplays] = None,
 ) -> tornado.web.Application:
     """Return the web application. Its handlers run in the thread of the loop that serves it."""
     shared = SensorRequests(sensors, ages)
+    replayed = ReplayRequests(replays or QuestionReplays())
     static = {'path': str(STATIC)}
     return tornado.web.Application(
         [
@@ -87,6 +91,8 @@ def make_app(
             (r'/model/([0-9]{1,9})', RobotAppearanceHandler, {'shared': shared}),
             (r'/recorded/([0-9]{1,9})', RecordedHandler, {'shared': history}),
             (r'/image/([0-9]{1,9})', QuestionImageHandler, {'shared': history}),
+            (r'/replay/([0-9]{1,9})', ReplayHandler, {'shared': replayed}),
+            (r'/replay/([0-9]{1,9})/([0-9]{1,5})', ReplayFrameHandler, {'shared': replayed}),
             (r'/()', PageFileHandler, dict(static, default_filename='index.html')),
             (r'/static/(.+)', PageFileHandler, static),
         ],
@@ -149,6 +155,7 @@ class Console:
         self._question_images = QuestionImages(
             files, self._discovery.sensors, self._discovery.cameras
         )
+        self._replays = QuestionReplays()
         self._catalogue = BagCatalogue(settings.bags, self._sections)
         self._teleoperation = Teleoperation(self._sections, self._front_end, self._audit)
         master = start_master_watch()
@@ -183,6 +190,7 @@ class Console:
             self._discovery.sensors,
             HistoryRequests(RecordedTrials(self._catalogue, layouts, files), files),
             ImageAges(self._clocks, self._discovery.cameras),
+            self._replays,
         )
         server = LimitedServer(
             app,
@@ -237,6 +245,7 @@ class Console:
         questions = self._front_end.questions()
         self._preconditions.write_sections(self._sections, questions)
         self._question_images.write_sections(self._sections, questions)
+        self._replays.write_sections(self._sections, questions)
         if time.monotonic() - self._overview_s > OVERVIEW_PERIOD_S:
             self._overview_s = time.monotonic()
             self._audit.prepare(self._front_end.servers)

@@ -29,6 +29,7 @@ SECTIONS = {
     'servers',
     'preconditions',
     'images',
+    'replays',
     'robots',
     'down',
     'health',
@@ -149,6 +150,7 @@ class WhatIsSent(console_case.ConsoleCase):
                 ('RecordedTrial', json.loads(recorded)),
                 ('Taken', taken()),
                 ('ModelHeader', console_shapes.model_header()),
+                ('Replay', console_shapes.replay()),
                 ('TrialEvent', console_shapes.later_event()),
             ]
         )

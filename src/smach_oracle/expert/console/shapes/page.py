@@ -47,6 +47,7 @@ SectionsView = TypedDict(
         'servers': List[QueryServerView],
         'preconditions': ByKey[ByState[List[PreconditionStatusView]]],
         'images': ByKey[List[KeptImageView]],
+        'replays': ByKey[int],  # numbers of what came before a failure: GET /replay/NUMBER
         'cameras': Dict[str, List[str]],  # of a robot, topics of its own, the likeliest first
         'robots': List[str],  # names of their nodes
         'health': Dict[str, RobotHealthView],  # by robot

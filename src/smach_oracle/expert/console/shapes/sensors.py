@@ -2,7 +2,7 @@
 
 from typing import List, Literal, Optional, Tuple, TypedDict
 
-from .basics import ByKey, DriveFrame, SensorKind, Size, Vector
+from .basics import ByKey, DriveFrame, EventName, SensorKind, Size, Vector
 
 Colour = Tuple[float, float, float]  # red, green, blue
 # name, position, velocity, effort; None: it was not measured
@@ -176,3 +176,28 @@ class ManipulationView(_ManipulationBase, total=False):
     """A manipulation interface that runs for a question."""
 
     state: HandStateView
+
+
+class ReplayEventView(TypedDict):
+    """An event of a replay."""
+
+    t: float  # s after the failure, below 0 before it
+    kind: EventName
+    words: str
+
+
+class JointCurveView(TypedDict):
+    """A joint that moved."""
+
+    name: str
+    samples: List[Tuple[float, float]]  # s after the failure, and the position
+
+
+class ReplayView(TypedDict):
+    """GET /replay/NUMBER: the last seconds before a failure."""
+
+    seconds: float  # how long before the failure it may begin
+    cameras: List[str]  # topics
+    frames: List[Tuple[int, float]]  # camera, and s after the failure
+    events: List[ReplayEventView]
+    joints: List[JointCurveView]  # those that moved most

@@ -50,6 +50,7 @@ export interface Sections {
   servers: QueryServer[];
   preconditions: ByKey<ByState<PreconditionStatus[]>>;
   images: ByKey<KeptImage[]>;
+  replays: ByKey<number>; // numbers of what came before a failure: GET /replay/NUMBER
   // of a robot, topics of its own, the likeliest first
   cameras: { [name: string]: string[] | undefined };
   robots: string[]; // names of their nodes
@@ -661,6 +662,28 @@ export interface Manipulation {
   wheel: number | null; // which page drives
   driver: string;
   state?: HandState;
+}
+
+/** An event of a replay. */
+export interface ReplayEvent {
+  t: number; // s after the failure, below 0 before it
+  kind: EventName;
+  words: string;
+}
+
+/** A joint that moved. */
+export interface JointCurve {
+  name: string;
+  samples: [number, number][]; // s after the failure, and the position
+}
+
+/** GET /replay/NUMBER: the last seconds before a failure. */
+export interface Replay {
+  seconds: number; // how long before the failure it may begin
+  cameras: string[]; // topics
+  frames: [number, number][]; // camera, and s after the failure
+  events: ReplayEvent[];
+  joints: JointCurve[]; // those that moved most
 }
 
 // --- people

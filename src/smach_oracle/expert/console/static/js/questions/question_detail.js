@@ -13,6 +13,7 @@ import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { callsWords } from './calls.js';
 import { ClaimBar } from './claim_bar.js';
+import { LastSeconds } from './last_seconds.js';
 import { Onlookers } from './onlookers.js';
 import { URGENT_S } from './queue_view.js';
 import { SilenceBar } from './silence_bar.js';
@@ -37,9 +38,8 @@ export class QuestionDetail {
     this.question = question;
     this.ways = ways;
     this.holderBefore = ''; // when this page claimed it last
-    this.settled = false; // this page has answered it
     this.claimed = Promise.resolve(); // the latest claim has its reply
-    this.held = false; // this page has claimed it
+    this.settled = this.held = false; // this page has answered it, or claimed it
     this.claimedAt = -Infinity; // ms, when it was tried last
     this.claiming = this.sending = this.ended = false; // ended: it is shown no longer
     this.problem = this.takenWords = ''; // the latter when somebody has taken it over
@@ -53,6 +53,7 @@ export class QuestionDetail {
     this.machine = new MachineView(machinesNow(app.store), () => {});
     this.hand = new MachineHand(app);
     this.camera = new SituationCamera(app, question);
+    this.lastSeconds = new LastSeconds(app, question.key);
     this.way = h('div', {}, visitsCard(question));
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
@@ -82,6 +83,7 @@ export class QuestionDetail {
       this.perceptionPlace, this.interfacePlace,
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
+          this.lastSeconds.root,
           h('section', { class: 'card mini-machine' }, this.hand.root, this.machine.root),
           this.way, userdataCard(question)),
         this.answers));
@@ -133,6 +135,7 @@ export class QuestionDetail {
     this.onlookers.leave();
     this.pause();
     this.camera.stop();
+    this.lastSeconds.end();
     if (this.perceptionPanel) this.perceptionPanel.stop();
     if (this.followUp) this.followUp.stop();
   }
@@ -316,6 +319,7 @@ export class QuestionDetail {
     if (changed('onlookers')) this.onlookers.show();
     if (changed('reach')) say(this.calls, callsWords(this.app, this.key));
     if (changed('images', 'cameras')) this.camera.update();
+    if (changed('replays')) this.lastSeconds.update();
     if (changed('sensors')) this.showPerception();
     if (changed('questions')) {
       if (this.now) redraw(this.way, visitsCard(this.now)); // events may come after the question

@@ -1,5 +1,5 @@
 // @ts-check
-// Curves of some joints over the last minute.
+// Curves of some joints over the last minute, or another time.
 import { h } from '../page/dom.js';
 
 export const HUES = [245, 20, 150, 320]; // of the curves
@@ -16,8 +16,9 @@ export class JointPlot {
   /**
    * @param {Sample[][]} curves
    * @param {number} now s
+   * @param {number} [span] s that are shown
    */
-  draw(curves, now) {
+  draw(curves, now, span = SPAN_S) {
     const { canvas } = this;
     const ratio = window.devicePixelRatio || 1;
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
@@ -37,7 +38,7 @@ export class JointPlot {
       context.lineWidth = 1.8;
       context.beginPath();
       for (const [time, value] of curve) {
-        context.lineTo(width * (1 - (now - time) / SPAN_S), y(value));
+        context.lineTo(width * (1 - (now - time) / span), y(value));
       }
       context.stroke();
     });
