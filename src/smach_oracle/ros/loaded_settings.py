@@ -45,7 +45,7 @@ class LoadedSettings(Dict[str, Any]):
         self._origins: Dict[str, str] = {}
         self._written: Dict[str, str] = {}
         if values:
-            self.put(*in_groups(values, IN_CODE, is_code=True))
+            self.put(*in_groups(values, IN_CODE, tells=False))
 
     def put(
         self,
@@ -100,18 +100,20 @@ def load_settings(
     path: Optional[str] = None,
     param: Optional[str] = DEFAULT_PARAM,
     overrides: Optional[Mapping[str, Any]] = None,
+    tells: bool = True,
 ) -> LoadedSettings:
     """Read and merge the settings.
 
     :param path: a YAML file, or None.
     :param param: a parameter that holds a mapping. Read only where this process is a ROS node.
     :param overrides: from the command line.
+    :param tells: whether older keys of the file are warned of.
     :raises SettingsError: naming file and line, or parameter, key, value and what is allowed.
     """
     settings = LoadedSettings()
     if path:
         values, lines = read_yaml(path_of(path))
-        settings.put(*in_groups(values, str(path), lines))
+        settings.put(*in_groups(values, str(path), lines, tells))
     if param and rospy.core.is_initialized():
         settings.put(*read_param(param))
         settings.put(*read_checkpoint())
@@ -124,11 +126,12 @@ def in_groups(
     values: Mapping[str, Any],
     origin: str,
     lines: Optional[Mapping[str, int]] = None,
-    is_code: bool = False,
+    tells: bool = True,
 ) -> SettingsSource:
     """Return settings with each key in its group.
 
-    An older key is warned of, once. In code it is not: there it is the name of a field.
+    An older key is warned of once, unless `tells` is false, as for code: there it is the name of a
+    field.
 
     :raises SettingsError: as `Groups.given_in`, naming the place.
     """
@@ -139,7 +142,7 @@ def in_groups(
         raise err.set_at(_place(origin, lines.get(err.key))) from err
     written = {GROUPS.key_of(each.name): each.written for each in given}
     for key, older in written.items():
-        if older in GROUPS.older_keys() and not is_code:
+        if older in GROUPS.older_keys() and tells:
             place = _place(origin, lines.get(older))
             warn_once('{}: {} is now called {}'.format(place, older, key))
     moved = {older: key for key, older in written.items()}

@@ -256,6 +256,12 @@ def test_a_wrong_parameter_of_a_machine_wrapped_in_code_is_an_error(check, spy):
     assert 'parameter /task/oracle' in last
 
 
+def test_an_older_key_of_the_settings_is_told_once(check):
+    code, _, errors = check('machine("HOME", "PICK").execute()', 'deadline_s: 60\n')
+    assert code == 0
+    assert errors.count('deadline_s is now called expert.deadline_s') == 1, errors
+
+
 @pytest.mark.parametrize(
     'settings, why',
     [

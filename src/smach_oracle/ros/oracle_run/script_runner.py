@@ -36,7 +36,9 @@ def check(invocation: Invocation) -> None:
     :raises SettingsError: in the settings file or the command line. The file of the rates, or the
         folder for the bags, cannot be written.
     """
-    loaded = load_settings(invocation.config, None, invocation.overrides)
+    # a check goes on in a process of its own, which reads them again
+    tells = not invocation.only_check
+    loaded = load_settings(invocation.config, None, invocation.overrides, tells)
     with _located(loaded):
         settings = Settings.from_dict(loaded, partial(_check_name, invocation.script))
         if settings.rates_file:
