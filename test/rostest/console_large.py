@@ -23,6 +23,36 @@ const row = document.querySelector(".states tr.failed").getBoundingClientRect();
 const frame = document.querySelector(".machine-card .table-frame").getBoundingClientRect();
 return Math.abs(row.top + row.height / 2 - frame.top - frame.height / 2);"""
 
+# a panel that is drawn twice, once while something in it is pressed: what stays, what is heard
+VIEWS = """const scripts = ["dom.js", "redraw.js"];
+return Promise.all(scripts.map((name) => import("/static/js/page/" + name))).then(
+([{ h }, { keep, render }]) => {
+  const heard = [];
+  const kept = h("canvas", {});
+  const typed = h("input", {});
+  const view = (number, names) => h("section", { class: "of-" + number },
+    keep(typed), names.map((name) => h("button", { key: name, "data-name": name,
+      onclick: () => heard.push(number + name) }, name)), h("div", {}, keep(kept)));
+  const root = h("section", {});
+  document.body.append(root);
+  const button = (name) => root.querySelector("[data-name=" + name + "]");
+  render(root, view(1, ["a", "b"]));
+  const [b, place] = [button("b"), kept.parentElement];
+  typed.focus();
+  render(root, view(2, ["b", "c"]));
+  const stays = b === button("b") && place === kept.parentElement && root.contains(kept);
+  const focused = document.activeElement === typed;
+  b.click();
+  const press = (type) => b.dispatchEvent(new PointerEvent(type, { bubbles: true }));
+  press("pointerdown");
+  render(root, view(3, ["c"]));
+  const waits = root.className + " " + root.contains(b);
+  b.click();
+  const after = root.className + " " + root.contains(b);
+  root.remove();
+  return { heard: heard.join(), stays, focused, waits, after };
+})"""
+
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class LargeMachines(ConsolePage, unittest.TestCase):
@@ -168,6 +198,18 @@ class LargeMachines(ConsolePage, unittest.TestCase):
         browser.click('.toast')
         self.assertTrue(
             wait_for(lambda: not browser.run('return document.querySelector(".toast")'))
+        )
+
+    def test_9_a_view_keeps_what_is_there_and_waits_for_a_press(self):
+        self.assertEqual(
+            self.browser.run(VIEWS),
+            {
+                'heard': '2b,2b',  # the listener of the newest view that had the button
+                'stays': True,
+                'focused': True,
+                'waits': 'of-2 true',
+                'after': 'of-3 false',
+            },
         )
 
 
