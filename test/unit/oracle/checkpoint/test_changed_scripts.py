@@ -220,14 +220,14 @@ def test_an_earlier_moment_of_before_can_still_be_gone_back_to(folder):
     [
         (
             {'NOWHERE': 'Y'},
-            "resume_map.NOWHERE: 'NOWHERE' is not allowed; allowed: a state of the "
+            "checkpoint.map.NOWHERE: 'NOWHERE' is not allowed; allowed: a state of the "
             'machine that was stopped: A, BOTH',
         ),
         (
             {'A': 'NOWHERE'},
-            "resume_map.A: 'NOWHERE' is not allowed; allowed: a state of the machine: BOTH",
+            "checkpoint.map.A: 'NOWHERE' is not allowed; allowed: a state of the machine: BOTH",
         ),
-        ({'KITCHEN/A': 'Y'}, "resume_map.KITCHEN/A: 'KITCHEN/A'"),
+        ({'KITCHEN/A': 'Y'}, "checkpoint.map.KITCHEN/A: 'KITCHEN/A'"),
     ],
 )
 def test_a_label_that_is_not_there_is_named_before_anything_moves(folder, names, why):
@@ -313,7 +313,7 @@ def test_in_the_same_script_a_map_is_of_no_effect_and_unknown_names_are_named(
     told = after.run()
     assert told['outcome'] == 'succeeded'
     log = told['log']
-    named = [text for text in log if 'resume_map' in text]
+    named = [text for text in log if 'checkpoint.map' in text]
     assert [
         re.search(
             "names '(.*)', which is not a state of the machine, and was not one "
@@ -332,7 +332,7 @@ def test_a_map_that_is_not_needed_any_more_is_not_warned_of(folder):
     after.run(kill_at=6)
     told = after.run()
     assert told['outcome'] == 'succeeded'
-    assert not [text for text in told['log'] if 'resume_map' in text]
+    assert not [text for text in told['log'] if 'checkpoint.map' in text]
 
 
 def test_oracle_state_tells_the_new_names(folder):
