@@ -6,7 +6,7 @@ as markup.
 
 import json
 import unicodedata
-from typing import Union
+from typing import Any, Union
 
 from smach_oracle.msg import ExpertQueryGoal, OracleEvent
 from smach_oracle.oracle.records.events import Event, EventKind
@@ -57,7 +57,7 @@ def failure_words(goal: ExpertQueryGoal) -> str:
 def _jumps_to(event: Union[OracleEvent, Event]) -> str:
     """The state, or its path where it is in a container below."""
     try:
-        data = json.loads(event.data) if isinstance(event.data, str) else event.data
+        data: Any = json.loads(event.data) if isinstance(event.data, str) else event.data
         return clean(str(data['to']))
     except (ValueError, KeyError, TypeError, RecursionError):
         return clean(event.target)

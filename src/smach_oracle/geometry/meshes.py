@@ -16,7 +16,7 @@ MOST_BYTES = 100000000  # of a file
 MOST_TEXT = 40000000  # of one that is text: it takes many times its size to read
 MOST_TRIANGLES = 2000000
 FURTHEST = 1e6  # of a corner from the origin, in the file's unit
-_STL = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
+_STL: np.dtype = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
 _FINEST = 2**20  # steps over the whole mesh: closer corners are one
 _DEEPEST = 60  # nodes of a COLLADA scene within each other
 
@@ -185,7 +185,9 @@ def _dae(data: bytes) -> Mesh:
         for each in root.findall('library_geometries/geometry')
     }
     parts = list(_placed(root, geometries)) or [(np.eye(4), mesh) for mesh in geometries.values()]
-    corners, triangles, before, total = [], [], 0, 0
+    corners: List[np.ndarray] = []
+    triangles: List[np.ndarray] = []
+    before, total = 0, 0
     for place, mesh in parts:
         total += len(mesh.triangles)
         if total > MOST_TRIANGLES:

@@ -1,6 +1,6 @@
 """The transforms along a robot's joints, from its description and the joints' positions."""
 
-from typing import List, Mapping, NamedTuple, Sequence, Tuple
+from typing import List, Mapping, NamedTuple, Sequence, Tuple, cast
 
 import numpy as np
 
@@ -54,7 +54,12 @@ class TransformTree:
 
 
 def _link(joint: Joint, place: np.ndarray, turn: np.ndarray) -> LinkTransform:
-    return LinkTransform(joint.parent, joint.child, tuple(place.tolist()), tuple(turn.tolist()))
+    return LinkTransform(joint.parent, joint.child, _numbers(place), _numbers(turn))
+
+
+def _numbers(vector: np.ndarray) -> Tuple[float, ...]:
+    # numpy's types may take the list for a text
+    return tuple(cast(List[float], vector.tolist()))
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -67,6 +72,4 @@ def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def link_transform(parent: str, child: str, matrix: np.ndarray) -> LinkTransform:
     """A link from its 4x4, parent from child."""
-    return LinkTransform(
-        parent, child, tuple(matrix[:3, 3].tolist()), tuple(quaternion(matrix).tolist())
-    )
+    return LinkTransform(parent, child, _numbers(matrix[:3, 3]), _numbers(quaternion(matrix)))

@@ -92,7 +92,8 @@ def cloud_message(
     for index, name in enumerate('xyz'):
         packed[name] = points[..., index]
     if colours is not None:
-        red, green, blue = (colours[..., index].astype(np.uint32) for index in range(3))
+        wide: np.ndarray = colours.astype(np.uint32)
+        red, green, blue = (wide[..., index] for index in range(3))
         packed['rgb'] = red << 16 | green << 8 | blue
     height, width = (1, shape[0]) if len(shape) == 1 else shape
     return PointCloud2(
@@ -121,7 +122,7 @@ def _known(image: Image, table: dict) -> Tuple:
 
 def _pixels(image: Image, kind: str, channels: int) -> np.ndarray:
     """(h, w, channels), rows without their padding."""
-    pixel = np.dtype(kind).newbyteorder('>' if image.is_bigendian else '<')
+    pixel: np.dtype = np.dtype(kind).newbyteorder('>' if image.is_bigendian else '<')
     row = image.width * channels * pixel.itemsize
     if (
         not image.width

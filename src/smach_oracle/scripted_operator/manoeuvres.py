@@ -222,7 +222,7 @@ def grasps(
         low, high = thing.centre[2] - thing.size[2] / 2, thing.centre[2] + thing.size[2] / 2
         height = min(max(thing.centre[2], low + 0.04 + 0.03 * np.sin(pitch)), high - 0.015)
         ahead = min(0.012, thing.narrow / 3)
-        pose[:3, 3] = thing.centre[:2].tolist() + [height]
+        pose[:3, 3] = [*thing.centre[:2], height]
         pose[:2, 3] += ahead * pose[:2, 0] / max(float(np.linalg.norm(pose[:2, 0])), 0.2)
         crowded = sum(max(0.0, CLEAR_OF - _beside(pose, other)) for other in others)
         found.append(

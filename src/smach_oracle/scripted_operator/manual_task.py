@@ -1,6 +1,6 @@
 """The operator's work once an interface runs: show a thing or drive the hand, end the goal."""
 
-from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple, cast
 
 import numpy as np
 import rospy
@@ -120,7 +120,8 @@ def _driven(task: ManualTask, interfaces: OperatorInterfaces) -> str:
             HandDriver(hand),
             interfaces.means,
             task.number,
-            lambda: task.generator.normal(0.0, _MISJUDGED),
+            # an array, which numpy's types may take for one number
+            lambda: cast(np.ndarray, task.generator.normal(0.0, _MISJUDGED)),
         )
 
     try:

@@ -103,7 +103,7 @@ def _is_framed(panel: np.ndarray) -> bool:
     """Whether a dark frame is around a bright plate."""
     grey = cv2.cvtColor(panel, cv2.COLOR_RGB2GRAY)
     frame, plate = _ring(grey, 0.5 * FRAME), _ring(grey, FRAME + 0.05)
-    return float(np.median(frame)) < 110 and float(np.median(plate)) > np.median(frame) + 60
+    return float(np.median(frame)) < 110 and float(np.median(plate)) > float(np.median(frame)) + 60
 
 
 def _why_none(image: np.ndarray) -> str:
@@ -156,7 +156,7 @@ def _needle(panel: np.ndarray) -> float:
     y, x = np.mgrid[0:SIDE, 0:SIDE] / SIDE
     right, up = x - DIAL[0], DIAL[1] - y
     radius = np.maximum(np.hypot(right, up), 1e-6)
-    colour = panel.astype(int)
+    colour: np.ndarray = panel.astype(int)
     red = colour[..., 0] - np.maximum(colour[..., 1], colour[..., 2]) > 50
     on_needle = red & (radius > NEEDLE[0]) & (radius < NEEDLE[1])
     whole = (NEEDLE[1] - NEEDLE[0]) * 0.03 * SIDE**2

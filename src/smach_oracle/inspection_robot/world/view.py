@@ -60,7 +60,7 @@ def view(
         _hang(image, pose, panel, fronts[panel.number], walls)
     for person in sorted(people, key=lambda each: -_distance(pose, each)):
         _stand(image, to_circle(pose, angles, person) * np.cos(_COLUMNS), walls)
-    bright = image.astype(np.float32)
+    bright: np.ndarray = image.astype(np.float32)
     if steam is not None:
         bright = _misted(bright, pose, angles, steam, walls)
     if light is not None:

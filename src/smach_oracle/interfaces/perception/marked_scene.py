@@ -1,6 +1,6 @@
 """The surface that a marked object stands on, and the other things there."""
 
-from typing import List, NamedTuple
+from typing import List, NamedTuple, Tuple, cast
 
 import numpy as np
 from scipy import ndimage
@@ -58,9 +58,11 @@ def scene_of(image: CameraImage, segmented: SegmentedObject) -> MarkedScene:
     for chosen in standing_on(points, plane, patch, LOWEST, HIGHEST, MARGIN):
         own = points[chosen]
         box = upright_box(own, plane.z_at(*own[:, :2].mean(axis=0)))
-        if max(box.wide, box.size[2]) <= LARGEST:
+        if max(box.wide, float(box.size[2])) <= LARGEST:
             others.append(box)
     others.sort(key=lambda box: float(np.hypot(*box.centre[:2])))
     top = upright_box(patch, float(patch[:, 2].min()))
-    centre = np.array([top.centre[0], top.centre[1], plane.z_at(top.centre[0], top.centre[1])])
+    # elements, which numpy's types may take for arrays
+    x, y = cast(Tuple[float, float], top.centre[:2])
+    centre = np.array([x, y, plane.z_at(x, y)])
     return MarkedScene(UprightBox(centre, top.size * [1, 1, 0], top.yaw), others)

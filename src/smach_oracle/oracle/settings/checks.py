@@ -245,8 +245,12 @@ def setting(
         'short': short,
         'marks': tuple(marks),
     }
+
+    def copied() -> T:
+        return copy(default)
+
     if isinstance(default, dict):
-        return field(default_factory=lambda: copy(default), metadata=facts)
+        return field(default_factory=copied, metadata=facts)
     return field(default=default, metadata=facts)
 
 

@@ -37,7 +37,9 @@ COLOURS = {
     'Green': '0.88 0.89 0.90 1',
     'Red': '0.25 0.26 0.28 1',
 }
-TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')])
+TRIANGLE: np.dtype = np.dtype(
+    [('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('attribute', '<u2')]
+)
 
 
 class ModelError(RuntimeError):

@@ -108,7 +108,8 @@ def _fitted(
 
 
 def _moved(values: np.ndarray) -> np.ndarray:
-    return np.asarray(from_rpy((values[0], values[1], 0.0), yaw=float(values[2])))
+    x, y, yaw = (float(each) for each in values[:3])
+    return np.asarray(from_rpy((x, y, 0.0), yaw=yaw))
 
 
 def _points_about(image: CameraImage, kitchen: Kitchen, door: DoorView) -> np.ndarray:

@@ -1,6 +1,6 @@
 """The table and the objects on it in what the head camera sees: a plane, and clusters above it."""
 
-from typing import List, NamedTuple, Optional, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple, cast
 
 import numpy as np
 
@@ -112,7 +112,7 @@ def find_tabletop(
     ):
         raise NotSeen('{} may be hidden in part, or something nearer{}'.format(what, BLIND))
     order = [target] + [each for each in clusters if not _overlap(each, target)]
-    objects = [each for each in order if max(each.box.wide, each.box.size[2]) <= LARGEST]
+    objects = [each for each in order if max(each.box.wide, float(each.box.size[2])) <= LARGEST]
     return Tabletop(
         _top(patch, plane),
         [each.box for each in objects],
@@ -136,7 +136,7 @@ def things_on_table(image: CameraImage, limbs: Sequence[Capsule] = ()) -> List[U
     return [
         each.box
         for each in clusters_on(cloud, plane, patch, 0.02, TALLEST)
-        if max(each.box.wide, each.box.size[2]) <= LARGEST
+        if max(each.box.wide, float(each.box.size[2])) <= LARGEST
     ]
 
 
@@ -159,10 +159,10 @@ def _beyond(
 def _top(patch: np.ndarray, plane: Plane) -> UprightBox:
     """The table's top, without thickness."""
     box = upright_box(patch, float(patch[:, 2].min()))
-    z = plane.z_at(box.centre[0], box.centre[1])
-    return box._replace(
-        centre=np.array([box.centre[0], box.centre[1], z]), size=box.size * [1, 1, 0]
-    )
+    # elements, which numpy's types may take for arrays
+    x, y = cast(Tuple[float, float], box.centre[:2])
+    z = plane.z_at(x, y)
+    return box._replace(centre=np.array([x, y, z]), size=box.size * [1, 1, 0])
 
 
 def distance_from(near: np.ndarray, point: np.ndarray) -> float:
@@ -248,7 +248,7 @@ def _check(cloud: OrganizedCloud, cluster: Cluster, what: str) -> None:
     if cut_off(cloud, cluster):
         raise NotSeen('{} is cut off by the edge of the image'.format(what), box.centre)
     extent = _in_cm(box.size)
-    if max(box.wide, box.size[2]) > LARGEST:
+    if max(box.wide, float(box.size[2])) > LARGEST:
         raise NotSeen(
             'what is nearest is no object: it is too large, {}; is an arm in the view?'.format(
                 extent

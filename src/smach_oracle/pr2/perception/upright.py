@@ -1,6 +1,6 @@
 """Whether what an image shows at a place stands there, and is the thing that was meant."""
 
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import NamedTuple, Optional, Sequence, Tuple, cast
 
 import numpy as np
 
@@ -82,7 +82,8 @@ def why_not_standing(
         return 'another thing is at its place: that is {}, and the object is {}'.format(
             name_of(colour), name_of(look.colour)
         )
-    tall = 2 * half[2]
+    # an element, which numpy's types may take for an array
+    tall = 2 * cast(float, half[2])
     high = float(np.percentile(points[:, 2], 90)) - (centre[2] - half[2])
     in_cm = '{:.0f} cm high, and the object is {:.0f} cm'.format(100 * high, 100 * tall)
     if high < UPRIGHT * tall:

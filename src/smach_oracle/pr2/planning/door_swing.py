@@ -1,6 +1,6 @@
 """Joint paths of a hand that goes with a door, and may turn about the vertical axis."""
 
-from typing import Callable, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, NamedTuple, Optional, Sequence, Tuple, cast
 
 import numpy as np
 
@@ -44,11 +44,13 @@ def best_swing(
     :returns: None where not even the first pose can be reached freely.
     """
     best: Optional[DoorSwing] = None
+    # an element, which numpy's types may take for an array
+    first = cast(float, angles[0])
     for _ in range(tries):
         turn = float(generator.uniform(*turns))
-        starts = chain.solutions(tool_at(angles[0], turn), seed, generator, restarts=6)
+        starts = chain.solutions(tool_at(first, turn), seed, generator, restarts=6)
         for start in starts[:3]:
-            if not (is_free(start, angles[0]) and may_begin(start)):
+            if not (is_free(start, first) and may_begin(start)):
                 continue
             swing = _follow(chain, tool_at, angles, turns, start, turn, is_free)
             if best is None or swing.share > best.share:

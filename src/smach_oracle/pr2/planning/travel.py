@@ -48,7 +48,7 @@ def carry(limb: Arm, level: bool = True) -> None:
     :raises SkillError: where the arm does not get there.
     """
     now = limb.pose()
-    height = min(max(now[2, 3], CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
+    height = min(max(float(now[2, 3]), CARRY_HEIGHTS[0]), CARRY_HEIGHTS[1])
     tilt = (
         np.eye(4)
         if level

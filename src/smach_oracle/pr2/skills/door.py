@@ -321,7 +321,7 @@ def _push_open(context: SkillContext, kitchen: Kitchen, arm: str, view: DoorView
         limb.go(swing.path[0])
         context.robot.gripper(arm, 0.0)
         strain(limb, swing, PUSH_SPEED)
-        place_door(limb, kitchen, fridge, swing.angles[-1])
+        place_door(limb, kitchen, fridge, float(swing.angles[-1]))
         draw_back(limb, BEFORE, ('door',), APPROACH_SPEED)
     return float(swing.angles[-1])
 

@@ -91,7 +91,7 @@ def _is_given(
             draw_back(hand, RETREAT, boxes, SLOW)
     stow(context, (arm,), boxes)
     image = context.robot.see()
-    top = middle_of_top(image, expected, 2 * held.half[2])
+    top = middle_of_top(image, expected, 2 * float(held.half[2]))
     if top is None:
         return False
     return not why_not_standing(image, top - [0.0, 0.0, held.half[2]], held.half, look=look)

@@ -103,7 +103,7 @@ def pick(
         if not candidates:
             raise SkillError(
                 'the object is too wide for the gripper from every side: {:.0f} x {:.0f} cm'.format(
-                    100 * target.size[0], 100 * target.size[1]
+                    100 * float(target.size[0]), 100 * float(target.size[1])
                 )
             )
         hand.open()
@@ -163,7 +163,7 @@ def _check_width(hand: Arm, target: UprightBox, gap: float) -> None:
     raise SkillError(
         'the gripper closed on something {:.1f} cm wide, and the object is {:.1f} x {:.1f} cm: it '
         'holds another thing, or a corner'.format(
-            100 * gap, 100 * target.size[0], 100 * target.size[1]
+            100 * gap, 100 * float(target.size[0]), 100 * float(target.size[1])
         )
     )
 

@@ -100,7 +100,10 @@ def place(
         if not spots:
             raise SkillError(
                 'no free spot within {:.0f} cm of x {:.2f}, y {:.2f} m: {} there'.format(
-                    100 * max(tolerance, USUAL), centre[0], centre[1], _who_stands(taken)
+                    100 * max(tolerance, USUAL),
+                    float(centre[0]),
+                    float(centre[1]),
+                    _who_stands(taken),
                 )
             )
         centre, path = _find_path(hand, spots, held, support, gently)
@@ -242,7 +245,7 @@ def _find_path(
                 reasons.append(str(err))
     raise SkillError(
         'no way to put the object down at x {:.2f}, y {:.2f} m: {}'.format(
-            spots[0][0], spots[0][1], summary(reasons)
+            float(spots[0][0]), float(spots[0][1]), summary(reasons)
         )
     )
 

@@ -8,7 +8,7 @@ import math
 import re
 from collections import deque
 from pathlib import Path
-from typing import Any, Deque, Dict, List, Optional, Tuple
+from typing import Any, Deque, Dict, List, Optional, Tuple, cast
 
 import yaml
 
@@ -90,8 +90,9 @@ class _Loader(yaml.SafeLoader):
             for key, _ in node.value:
                 if isinstance(key, yaml.ScalarNode):
                     key.tag = _TAG + 'str'
+        # the base class refuses any other node, with an error of its own
         mapping: Dict[Any, Any] = yaml.constructor.BaseConstructor.construct_mapping(
-            self, node, deep=deep
+            self, cast(yaml.MappingNode, node), deep=deep
         )
         return mapping
 

@@ -263,7 +263,7 @@ class Controllers:
         if len(times) > 1:
             motion: Motion = Trajectory(joints, positions, times)
         else:
-            motion = StreamedTarget(dict(zip(joints, positions[0].tolist())), float(times[0]))
+            motion = StreamedTarget(dict(zip(joints, map(float, positions[0]))), float(times[0]))
         self._motions.start(part, motion, lambda end: self._streamed(), NEWER)
 
     def _localise(self, message: PoseWithCovarianceStamped) -> None:

@@ -224,7 +224,7 @@ def odom_from_pose(pose: PoseStamped, odom_from_base: np.ndarray) -> np.ndarray:
     if np.abs(found[:2, 3]).max() > FARTHEST:
         raise BadGoal(
             'target_pose: x {:.3g}, y {:.3g} m in {}; allowed: -{:g} to {:g} m'.format(
-                found[0, 3], found[1, 3], ODOM_FRAME, FARTHEST, FARTHEST
+                float(found[0, 3]), float(found[1, 3]), ODOM_FRAME, FARTHEST, FARTHEST
             )
         )
     return found

@@ -55,7 +55,7 @@ class Recognition:
         return RecogniseResponse(True, '', chance, things)
 
     def _message(self, name: str, mask: np.ndarray, stamp: rospy.Time) -> SeenThing:
-        (top, bottom), (left, right) = _span(mask.any(axis=1)), _span(mask.any(axis=0))
+        (top, bottom), (left, right) = _span(np.any(mask, axis=1)), _span(np.any(mask, axis=0))
         region = RegionOfInterest(
             x_offset=left, y_offset=top, width=right - left, height=bottom - top
         )

@@ -313,7 +313,8 @@ def _start(world: DisturbedWorld, disturbance: Disturbance) -> Dict[str, float]:
     kind, _, body = disturbance.kind.partition(':')
     if kind == 'swing':
         return {joint: world.body_joint(body, joint) for joint in world.body_joints(body)}
-    return dict(zip('xy', world.body_pose(body)[:2, 3].tolist()))
+    x, y = (float(each) for each in world.body_pose(body)[:2, 3])
+    return {'x': x, 'y': y}
 
 
 def _joints(disturbance: Disturbance) -> List[str]:

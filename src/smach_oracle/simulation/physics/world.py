@@ -5,7 +5,7 @@ fresh physics client, and nothing here reads a clock or shares a random generato
 """
 
 import math
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple, cast
 
 import numpy as np
 import pybullet
@@ -244,9 +244,9 @@ class World:
         :param share: of the error that is drawn again: a short drive keeps most of the last one's.
         """
         self.drives += 1
-        drawn = np.random.default_rng([self.scene.seed, 101, self.drives]).normal(
-            0.0, self.scene.robot.drive_error
-        )
+        generator = np.random.default_rng([self.scene.seed, 101, self.drives])
+        # an array, which numpy's types may take for one number
+        drawn = cast(np.ndarray, generator.normal(0.0, self.scene.robot.drive_error))
         before = np.array(
             [self.belief_error[0, 3], self.belief_error[1, 3], yaw_of(self.belief_error)]
         )

@@ -75,15 +75,11 @@ def state_from(data: Mapping[str, Any]) -> LabState:
 
     :raises KeyError, TypeError or ValueError: where it is not one.
     """
-    things = tuple(
-        Body(
-            **{
-                name: tuple(value) if isinstance(value, list) else value
-                for name, value in thing.items()
-            }
-        )
+    given: List[Dict[str, Any]] = [
+        {name: tuple(value) if isinstance(value, list) else value for name, value in thing.items()}
         for thing in data['things']
-    )
+    ]
+    things = tuple(Body(**each) for each in given)
     return LabState(
         float(data['began']),
         float(data['ended']),

@@ -1,6 +1,6 @@
 """Point clouds thinned to what a browser can turn round smoothly. Messages only, no node."""
 
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Optional, Tuple, cast
 
 import numpy as np
 from sensor_msgs.msg import JointState, PointCloud2, PointField
@@ -141,7 +141,7 @@ def _records(message: PointCloud2, chosen: np.ndarray) -> np.ndarray:
 def _values(
     records: np.ndarray, field: PointField, message: PointCloud2, code: str = ''
 ) -> np.ndarray:
-    kind = np.dtype(code or _CODES.get(field.datatype, 'f4')).newbyteorder(
+    kind: np.dtype = np.dtype(code or _CODES.get(field.datatype, 'f4')).newbyteorder(
         '>' if message.is_bigendian else '<'
     )
     if field.offset + kind.itemsize > message.point_step:
@@ -161,7 +161,7 @@ def _colours(
     field = fields.get('rgb') or fields.get('rgba')
     if field is not None:
         # declared as a float by custom
-        packed = _values(records, field, message, 'u4').astype(np.uint32)
+        packed: np.ndarray = _values(records, field, message, 'u4').astype(np.uint32)
         return np.stack([packed >> shift & 255 for shift in (16, 8, 0)], axis=1).astype(np.uint8)
     return by_rank(points[:, 2])
 
@@ -183,5 +183,6 @@ def _ranked(values: np.ndarray) -> np.ndarray:
 def _span(values: np.ndarray) -> Tuple[float, float]:
     if not len(values):
         return 0.0, 1.0
-    low, high = (float(each) for each in np.percentile(values, (2, 98)))
+    # an array, which numpy's types may take for one number
+    low, high = (float(each) for each in cast(np.ndarray, np.percentile(values, (2, 98))))
     return low, max(high, low + 1e-6)

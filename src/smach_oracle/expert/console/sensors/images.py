@@ -6,7 +6,7 @@ bytes reaches a browser.
 
 import os
 import struct
-from typing import Any, Dict, List, NamedTuple, Union
+from typing import Any, Dict, List, NamedTuple, Union, cast
 
 # before cv2 is there: small files of huge images
 os.environ.setdefault('OPENCV_IO_MAX_IMAGE_PIXELS', str(2**26))
@@ -113,9 +113,10 @@ def _depth_file(depth: np.ndarray, width: int) -> BrowserFile:
     height, original = depth.shape
     small = _narrowed(depth, width, cv2.INTER_NEAREST)
     measured = small[np.isfinite(small)]
-    near, far = (
-        (float(each) for each in np.percentile(measured, (2, 98))) if measured.size else (0.0, 0.0)
-    )
+    near, far = 0.0, 0.0
+    if measured.size:
+        # an array, which numpy's types may take for one number
+        near, far = (float(each) for each in cast(np.ndarray, np.percentile(measured, (2, 98))))
     return BrowserFile(
         'image/png',
         _file('.png', false_colours(small, near, far), [cv2.IMWRITE_PNG_COMPRESSION, 1]),
@@ -156,7 +157,7 @@ def _unpacked_depth(message: CompressedImage) -> np.ndarray:
     stored = _decoded(data[_DEPTH_HEADER.size :], cv2.IMREAD_UNCHANGED)
     if stored.ndim != 2 or stored.dtype != np.uint16:
         raise ImageError('the compressed depth image holds no 16 bit depth')
-    depth = stored.astype(np.float32)
+    depth: np.ndarray = stored.astype(np.float32)
     with np.errstate(divide='ignore', invalid='ignore'):
         depth = (
             factor / (depth - offset)
