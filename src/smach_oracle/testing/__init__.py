@@ -18,6 +18,7 @@ from .script import AnswerScript, expert, give_up, goto, no_answer, supersede, u
 from .script_run import ScriptRun, run_script
 from .soak import soak, soak_trial
 from .soak_report import SoakReport, SoakRow, SoakTrial
+from .stopped_clock import StoppedClock
 
 __all__ = [
     'AnswerScript',
@@ -31,6 +32,7 @@ __all__ = [
     'SoakReport',
     'SoakRow',
     'SoakTrial',
+    'StoppedClock',
     'TrialLimitError',
     'crash',
     'expert',

@@ -31,6 +31,7 @@ from .injection import Injection
 from .observed_trial import ObservedTrial, TrialEvidence
 from .places import StatePlace, places_of
 from .script import AnswerScript, expert, no_answer
+from .stopped_clock import StoppedClock
 from .trial_text import ProbedStep, TrialStep, place_of
 
 if TYPE_CHECKING:
@@ -73,6 +74,7 @@ class Bench:
         preconditions: PreconditionLists = None,
         limit_s: float = LIMIT_S,
         ros: bool = False,
+        clock: Optional[StoppedClock] = None,
     ) -> None:
         """Put a machine on the bench.
 
@@ -84,6 +86,8 @@ class Bench:
             alone.
         :param limit_s: seconds of wall time after which a trial is an error.
         :param ros: attach the machine to its ROS node: events, introspection, `~expert_query`.
+        :param clock: by which limits and waits of the oracle go, and waits of faults. None: they go
+            by real time.
         :raises FaultError: for a fault that fits no state.
         :raises SettingsError: naming key, value and what is allowed.
         :raises TrialError: for a machine that is wrapped inside another one.
@@ -92,6 +96,7 @@ class Bench:
         self.machine = machine
         self.faults = tuple(faults)
         self._limit_s = limit_s
+        self._clock = clock
         self._node = _node_side(machine) if ros else None
         self._was_wrapped = isinstance(machine, OracleContainer)
         if self._was_wrapped and not oracle_of(machine).is_top:
@@ -199,20 +204,24 @@ class Bench:
 
     def _injection(self, faults: Tuple[Fault, ...], notes: '_TrialNotes') -> Injection:
         __tracebackhide__ = True
-        return Injection(self.machine, faults, notes.note_probe, self._failing)
+        return Injection(self.machine, faults, notes.note_probe, self._failing, self._clock)
 
     @contextlib.contextmanager
     def _watched(self, notes: '_TrialNotes') -> Iterator[None]:
-        """Let the events of the machine and the questions of its expert go to the notes."""
+        """Let events and questions go to the notes, and the time by the clock of the bench."""
         oracle = oracle_of(self.machine)
         if self._expert is not None:
             oracle.expert = _NotingExpert(self._expert, notes.questions)
+        clock_before = oracle.clock
+        if self._clock is not None:
+            oracle.clock = self._clock
         observer = notes.note_event
         oracle.events.observers.append(observer)
         try:
             yield
         finally:
             remove_identical(oracle.events.observers, observer)
+            oracle.clock = clock_before
             if self._expert is not None:
                 oracle.expert = self._expert_before
 

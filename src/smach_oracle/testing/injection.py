@@ -5,6 +5,7 @@ stands before that of its class for a while.
 """
 
 import contextlib
+import math
 import random
 import threading
 import time
@@ -16,6 +17,7 @@ from smach_oracle.oracle.settings.failing_outcomes import PREEMPTED, FailingName
 from .errors import FaultError
 from .faults import Fault, FaultKind
 from .places import StatePlace, did_you_mean, find_place, places_of
+from .stopped_clock import StoppedClock
 
 _PERIOD_S = 0.01  # how soon a fault that waits notices a preempt
 # told of a place, its visit, what happens (entered, fault, stub, ended, raised), and a text
@@ -48,7 +50,7 @@ class ArmedFault:
             return False
         return self.fault.probability >= 1.0 or self._random.random() < self.fault.probability
 
-    def strike(self, userdata: Any, lifted: threading.Event, work: Callable[[], object]) -> object:
+    def strike(self, userdata: Any, wait: 'FaultWait', work: Callable[[], object]) -> object:
         """Go wrong in place of the state, or before its work.
 
         It raises what an EXCEPTION fault is to raise.
@@ -62,27 +64,33 @@ class ArmedFault:
         if fault.error is not None:
             raise fault.error.with_traceback(None)
         if fault.kind is FaultKind.OVERRUN:
-            in_time = _wait(state, lifted, time.monotonic() + fault.seconds, True)
-            return work() if in_time else _preempted(state)
-        _wait(state, lifted, None, not fault.ignores_preempt)
+            return work() if wait.lasts(state, fault.seconds, True) else _preempted(state)
+        wait.lasts(state, math.inf, not fault.ignores_preempt)
         return _preempted(state)
 
 
-def _wait(
-    state: smach.State, lifted: threading.Event, end_s: Optional[float], heeds_preempt: bool
-) -> bool:
-    """Wait until `end_s` (monotonic, None means without end).
+class FaultWait:
+    """The waits of faults, until they are taken out of the machine."""
 
-    Return False where something ended it before.
-    """
-    while not lifted.is_set() and not smach.is_shutdown():
-        if heeds_preempt and state.preempt_requested():
-            return False
-        left_s = _PERIOD_S if end_s is None else min(_PERIOD_S, end_s - time.monotonic())
-        if left_s <= 0:
-            return True
-        lifted.wait(left_s)
-    return False
+    def __init__(self, clock: Optional[StoppedClock]) -> None:
+        """`clock`: by which the time passes. None: it is real time."""
+        self.lifted = threading.Event()
+        self._pass_some = clock.pass_some if clock is not None else self._really_pass
+
+    def lasts(self, state: smach.State, seconds: float, heeds_preempt: bool) -> bool:
+        """Wait in place of a state. Return False where something ended it before."""
+        while not self.lifted.is_set() and not smach.is_shutdown():
+            if heeds_preempt and state.preempt_requested():
+                return False
+            if seconds <= 0:
+                return True
+            seconds -= self._pass_some(seconds)
+        return False
+
+    def _really_pass(self, most_s: float) -> float:
+        begun_s = time.monotonic()
+        self.lifted.wait(min(_PERIOD_S, most_s))
+        return time.monotonic() - begun_s
 
 
 def _preempted(state: smach.State) -> object:
@@ -102,9 +110,11 @@ class Injection:
         faults: Iterable[Fault] = (),
         report: Report = _tell_nobody,
         failing: Optional[FailingNames] = None,
+        clock: Optional[StoppedClock] = None,
     ) -> None:
         """Find the places of the faults. Nothing is changed yet.
 
+        :param clock: by which faults wait. None: they wait in real time.
         :raises FaultError: where a state is not there, or has not registered an outcome.
         """
         __tracebackhide__ = True
@@ -115,7 +125,7 @@ class Injection:
             self.armed.append(self._armed(fault))
         self.armed.sort(key=lambda armed: armed.fault.is_stub)  # the others come first
         self._report = report
-        self._lifted = threading.Event()
+        self._wait = FaultWait(clock)
         self._lock = threading.Lock()
         self._visits: Dict[str, int] = {}
         self._changed: List[Tuple[smach.State, object]] = []  # and what stood there before
@@ -170,7 +180,7 @@ class Injection:
 
     def take_out(self) -> None:
         """Put everything back, and let go of what hangs."""
-        self._lifted.set()
+        self._wait.lifted.set()
         for state, before in reversed(self._changed):
             if before is _MISSING:
                 vars(state).pop('execute', None)
@@ -190,7 +200,7 @@ class Injection:
                 return type(state).execute(state, *args, **kwargs)
 
             place = next((each for each in places if each.visited_now()), None)
-            if place is None or self._lifted.is_set():
+            if place is None or self._wait.lifted.is_set():
                 return work()
             return self._visit(place, args[0] if args else kwargs.get('parent_ud'), work)
 
@@ -211,7 +221,7 @@ class Injection:
                 self._report(
                     place, visit, 'stub' if due[0].fault.is_stub else 'fault', due[0].does()
                 )
-                outcome = due[0].strike(userdata, self._lifted, work)
+                outcome = due[0].strike(userdata, self._wait, work)
             else:
                 outcome = work()
         except BaseException as err:

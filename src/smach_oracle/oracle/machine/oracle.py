@@ -156,6 +156,18 @@ class Oracle:
     def waiting(self, waiting: Waiting) -> None:
         self._node.tree.waiting = waiting
 
+    @property
+    def clock(self) -> Clock:
+        """The clock of limits, deadlines and waits: monotonic time, unless a test sets another one.
+
+        It is set between two trials.
+        """
+        return self._node.tree.clock.goes_by
+
+    @clock.setter
+    def clock(self, clock: Clock) -> None:
+        self._node.tree.clock.goes_by = clock
+
     def count_work_by(self, clock: Clock) -> None:
         """Have the minutes by which ways are priced go by a clock, from the next trial on.
 

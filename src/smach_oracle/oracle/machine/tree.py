@@ -17,7 +17,7 @@ from ..control.control import Control
 from ..records.early_end import EarlyEnd, Restarts
 from ..records.events import EventSource
 from ..scope.alarm_clock import AlarmClock
-from ..scope.clock import Clock
+from ..scope.clock import Clock, TreeClock
 from ..scope.scope import Reason, Scope, Waiting
 from ..settings.health import HealthFunction
 from .health_watch import HealthWatch
@@ -75,7 +75,7 @@ class Tree:
         self, expert: Optional[Expert] = None, health: Optional[HealthFunction] = None
     ) -> None:
         """Have nothing under way, nothing asked by an operator, and locks that nobody holds."""
-        clock = Clock()
+        clock = self.clock = TreeClock(Clock())
         self.expert = expert
         # has a store keep which states have begun, at once, where there is no event of it
         self.keep_marks: Callable[[], None] = no_store

@@ -78,6 +78,19 @@ class Clock:
         bell.wait(min(left_s, longest_s))
 
 
+class TreeClock(Clock):
+    """The clock of a tree of containers: real time, or that of the clock which a test puts in."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.goes_by = clock
+
+    def now(self) -> float:
+        return self.goes_by.now()
+
+    def wait(self, bell: Bell, left_s: float, longest_s: float, is_pause: bool) -> None:
+        self.goes_by.wait(bell, left_s, longest_s, is_pause)
+
+
 class PausableClock:
     """Shows the seconds since it began, except those in which it was paused.
 
