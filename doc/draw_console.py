@@ -4,10 +4,10 @@ oracle, the simulated PR2, a headless Chromium.
 
     python3 doc/draw_console.py [--to FOLDER] [--of kitchen|pr2|recording]
 
-`recording` writes recovery.gif: a failure, a question, an answer and success. `kitchen` writes
-console_question.png and console_machine.png. `pr2` writes console_perception.png, console_hand.png,
-console_3d.png and console_replay.png, and takes some minutes. Each starts a ROS master of its own.
-Look at what they have drawn.
+`recording` writes recovery.gif: a failure, a question, an answer and success. `kitchen` has seven
+robots, and writes console_robots.png, console_question.png and console_machine.png. `pr2` writes
+console_perception.png, console_last_seconds.png, console_hand.png, console_3d.png and
+console_replay.png. Each starts a ROS master of its own. Look at what they have drawn.
 """
 
 import argparse
@@ -23,11 +23,27 @@ sys.path[:0] = [os.path.join(DOC, '..', folder) for folder in ('test/rostest', '
 SIZE = (1400, 900)
 MOST_BYTES = 200000  # of a picture
 MOST_BYTES_MOVING = 1500000
+REASON = 'no grasp found: the handle points to the wall'
+# robots beside /alpha: arguments of console_robot.py, and why their state fails
+OTHERS = {
+    'bravo': (('DETECT', '0.4', '2', '9'), 'no mug in sight'),
+    'charlie': (('PLACE', '0.4', '2', '9'), 'the shelf is full'),
+    'delta': (('PICK', '0.4', '2', '9'), 'no grasp found: the mug stands too far away'),
+    'echo': (('NONE', '4', '2', '9', '0.1'), ''),
+    'foxtrot': (('NONE', '4', '2', '9', '0.1'), ''),
+    'golf': (('NONE', '4', '2', '9', '0.1'), ''),
+}
+CARD = '.fleet-card[data-robot="/{}"]'
 QUESTION = '.question-row.pending[data-key^="/{}/"]'
 CAMERA = '/head_camera/rgb/image_raw'
 CLOUD = '/head_camera/depth_registered/points'
 TABLE, HAND = (0.7, -0.05, 0.7), (0.55, -0.4, 0.85)  # m in base_footprint, to look at
 MARKED = ((0.27, 0.44), (0.405, 0.69))  # two corners around an object, as shares of the image
+BEFORE_S = 6.0  # the moment of the replay that is shown, before the failure
+SEEK = """
+const slider = document.querySelector(".last-seconds [data-replay=scrubber]");
+slider.value = -arguments[0];
+slider.dispatchEvent(new Event("input"));"""
 PICTURED = """
 const view = document.querySelector(arguments[0]);
 if (!view || view.width < 100) return false;
@@ -56,19 +72,31 @@ def main():
 
 
 def draw_kitchen(_processes, folder):
-    """A question, and a machine that is paused."""
+    """All robots, a question of one, and its machine that is paused."""
     import rospy
-    from console_page import ConsolePage
+    from console_page import HERE, ConsolePage, Node
 
     class KitchenPage(ConsolePage):
         """The page of which pictures are taken."""
 
     rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
-    rospy.set_param('/alpha/reason', 'no grasp found: the handle points to the wall')
+    rospy.set_param('/alpha/reason', REASON)
+    parts = publish_health()
+    others = []
     try:
         KitchenPage.begin('console_robot.py', 'PICK', '0.4', '2', '9', size=SIZE, name='ann')
+        resize(KitchenPage.browser)
+        for name, (arguments, reason) in OTHERS.items():
+            rospy.set_param('/{}/reason'.format(name), reason)
+            robot = os.path.join(HERE, 'console_robot.py')
+            others.append(Node(sys.executable, robot, *arguments, '__name:=' + name))
+        show_fleet(KitchenPage.browser, folder)
         work_in_kitchen(KitchenPage.browser, folder)
     finally:
+        for each in others:
+            each.stop()
+        for each in parts:
+            each.unregister()
         KitchenPage.tearDownClass()
         rospy.signal_shutdown('drawn')
 
@@ -82,7 +110,7 @@ def record_answer(_processes, folder):
         """The page that is recorded."""
 
     rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
-    rospy.set_param('/alpha/reason', 'no grasp found: the handle points to the wall')
+    rospy.set_param('/alpha/reason', REASON)
     frames = []  # PNG and s that it is shown
     try:
         RecordedPage.begin(
@@ -141,6 +169,41 @@ def write_gif(frames, path):
     assert os.path.getsize(path) < MOST_BYTES_MOVING, path
 
 
+def publish_health():
+    """Batteries and diagnostics of some robots; the publishers, which must be kept."""
+    import rospy
+    from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+    from sensor_msgs.msg import BatteryState
+
+    charges = {'alpha': 0.81, 'delta': 0.57, 'echo': 0.12, 'golf': 0.94}
+    publishers = []
+    for name, charge in charges.items():
+        topic = '/{}/battery'.format(name)
+        publishers.append(rospy.Publisher(topic, BatteryState, queue_size=1, latch=True))
+        publishers[-1].publish(percentage=charge, voltage=21.0 + 4.0 * charge)
+    publishers.append(rospy.Publisher('/diagnostics', DiagnosticArray, queue_size=1, latch=True))
+    motor = DiagnosticStatus(
+        level=DiagnosticStatus.WARN, name='foxtrot: left motor', message='temperature 71 °C'
+    )
+    publishers[-1].publish(status=[motor])
+    return publishers
+
+
+def show_fleet(browser, folder):
+    """All robots, one of them paused."""
+    browser.click('#tab-fleet')
+    for name, (_, reason) in OTHERS.items():
+        expect(browser, 'needs an answer' if reason else 'est. ', CARD.format(name))
+    expect(browser, 'needs an answer', CARD.format('alpha'))
+    expect(browser, 'temperature', CARD.format('foxtrot'))
+    expect(browser, 'Battery low', CARD.format('echo'))
+    browser.click(CARD.format('golf') + ' [data-action=pause-robot]')
+    expect(browser, 'in KITCHEN will run', CARD.format('golf'))
+    browser.find(CARD.format('golf') + ' [data-action=resume-robot][data-settled]')
+    take(browser, folder, 'console_robots')
+    browser.click('#tab-questions')
+
+
 def work_in_kitchen(browser, folder):
     """Work through a question, and take a picture at each place."""
     browser.click(QUESTION.format('alpha'))
@@ -194,10 +257,10 @@ def draw_pr2(processes, folder):
     rospy.set_param('/pr2/failure_cameras', [CAMERA])
     try:
         RobotPage.begin('draw_console_robot.py', size=SIZE, name='ann')
-        # from here on the page has the size of the pictures
-        RobotPage.browser.screenshot(os.path.join(bags, 'first.png'), *SIZE)
+        resize(RobotPage.browser)
         mark_an_object(RobotPage.browser, folder)
         look_at(HAND)
+        go_through_last_seconds(RobotPage.browser, folder)
         drive_the_hand(RobotPage.browser, folder)
         look_in_3d(RobotPage.browser, folder)
         RobotPage.console.stop()
@@ -245,19 +308,21 @@ def mark_an_object(browser, folder):
     action.move_to_element_with_offset(canvas, *first).click_and_hold()
     action.move_to_element_with_offset(canvas, *last).release().perform()
     browser.find('[data-fact=size]')
-    until(
-        lambda: (
-            browser.run(
-                'return Number(document.querySelector(".object-view .cloud")'
-                '.dataset.triangles || 0)'
-            )
-            > 10000
-        ),
-        'the robot beside the object',
-    )
+    expect_robot(browser, '.object-view')
     browser.find('.accept[data-settled], [data-settled] .accept')
     take(browser, folder, 'console_perception')
     browser.click('.perception .accept')
+
+
+def go_through_last_seconds(browser, folder):
+    """The second question, with what came before its failure."""
+    browser.click(QUESTION.format('pr2'), 60.0)
+    browser.find('.last-seconds:not([hidden])')
+    until(lambda: browser.text('.last-seconds h3').startswith('Last 30 s'), '30 s')
+    browser.run(SEEK, BEFORE_S)
+    until(lambda: browser.run(PICTURED, '.last-seconds canvas.image'), 'the image before')
+    browser.run('document.querySelector(".last-seconds").scrollIntoView({ block: "center" })')
+    take(browser, folder, 'console_last_seconds')
 
 
 def drive_the_hand(browser, folder):
@@ -265,7 +330,6 @@ def drive_the_hand(browser, folder):
     from selenium.webdriver.common.action_chains import ActionChains
 
     scheme(browser, 'dark')
-    browser.click(QUESTION.format('pr2'), 60.0)
     browser.click('.choice.interface[data-name=manipulation]')
     browser.find('.manipulation', 60.0)
     browser.click('.manipulation .wheel')
@@ -273,6 +337,8 @@ def drive_the_hand(browser, folder):
     browser.click('[data-arm=right]')
     browser.click('[data-frame=base]')
     until(lambda: browser.run(PICTURED, '.drive-stage canvas'), 'the camera')
+    browser.click('[data-view$=robot_description]')
+    expect_robot(browser, '.drive-stage')
     browser.run('document.querySelector(".manipulation").scrollIntoView()')
     browser.hold('r')
     until(lambda: 'mm/s' in browser.text('.manipulation'), 'the hand moves')
@@ -287,15 +353,7 @@ def look_in_3d(browser, folder):
     browser.click('#tab-sensors')
     browser.click('.sensor-list [data-topic="{}"]'.format(CLOUD))
     expect(browser, 'of 307200 points', '.cloud-view')
-    until(
-        lambda: (
-            browser.run(
-                'return Number(document.querySelector(".cloud-view .cloud").dataset.triangles || 0)'
-            )
-            > 10000
-        ),
-        'the robot beside its cloud',
-    )
+    expect_robot(browser, '.cloud-view')
     take(browser, folder, 'console_3d')
     browser.click('.cloud-view .view-close')
     scheme(browser, 'light')
@@ -329,6 +387,12 @@ def scheme(browser, name):
     )
 
 
+def resize(browser):
+    """From here on the page has the size of the pictures, so that none of them moves it."""
+    with tempfile.TemporaryDirectory() as folder:
+        browser.screenshot(os.path.join(folder, 'first.png'), *SIZE)
+
+
 def until(is_so, what, limit_s=60.0):
     """Wait for it.
 
@@ -338,6 +402,12 @@ def until(is_so, what, limit_s=60.0):
 
     if not wait_for(is_so, limit_s):
         raise AssertionError('the page does not show ' + what)
+
+
+def expect_robot(browser, view):
+    """Wait until a view in 3D shows the robot."""
+    script = 'return Number(document.querySelector(arguments[0])?.dataset.triangles || 0) > 10000'
+    until(lambda: browser.run(script, view + ' .cloud'), 'the robot in 3D')
 
 
 def expect(browser, words, selector='body'):

@@ -9,11 +9,12 @@ from smach_oracle import OracleContainer
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
 FAILS = {'DETECT_TABLETOP': 'no object stands out of the table', 'PICK': 'no grasp is within reach'}
 OUTPUTS = {'DETECT_TABLETOP': ['table', 'objects', 'sizes'], 'PICK': ['grasp']}
+SECONDS = {'LOOK_AT_TABLE': 14.0, 'PLACE': 2.0}  # together more than a replay holds
 INPUTS = {'PICK': ['objects', 'arm'], 'PLACE': ['grasp']}
 
 
 class Work(smach.State):
-    """Takes two seconds."""
+    """Takes some seconds, and fails where `FAILS` says so."""
 
     def __init__(self, label):
         smach.State.__init__(
@@ -22,7 +23,7 @@ class Work(smach.State):
         self._label = label
 
     def execute(self, ud):
-        rospy.sleep(2.0)  # the state takes so long
+        rospy.sleep(SECONDS.get(self._label, 6.0))  # the state takes so long
         if self._label in FAILS:
             raise RuntimeError(FAILS[self._label])
         return 'succeeded'
@@ -41,8 +42,7 @@ def main():
         sm,
         name='CLEAR_TABLE',
         settings={
-            'high_from': 0.1,
-            'moderate_from': 0.05,
+            'states': {label: {'prior': 0.75} for label in FAILS},  # so that a person is asked
             'expert': {
                 'deadline_s': 900.0,
                 'interfaces': {
