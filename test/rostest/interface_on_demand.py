@@ -72,7 +72,8 @@ class InterfaceOnDemand(unittest.TestCase):
         shutil.rmtree(cls.folder)
 
     def offer(self, **changes):
-        entry = dict(yaml.safe_load(blocks('yaml')[-1])['interfaces']['by_hand'], **changes)
+        given = yaml.safe_load(blocks('yaml')[-1])['expert']['interfaces']['by_hand']
+        entry = dict(given, **changes)
         entry = {key: value for key, value in entry.items() if value is not None}
         return Settings.from_dict({'expert': {'interfaces': {'by_hand': entry}}}).offers_for(
             '', 'PICK'
