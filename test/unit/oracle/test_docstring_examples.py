@@ -39,6 +39,7 @@ SHOWN = [
     way_results.failure_text_key,
     smach_oracle.analysis.TrialSet,
     smach_oracle.testing.Bench,
+    smach_oracle.testing.StoppedClock,
     smach_oracle.testing.expert,
     smach_oracle.testing.faults,
     smach_oracle.testing.soak,
