@@ -12,7 +12,7 @@ import sqlite3
 import time
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple, Union
+from typing import Dict, Iterator, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.user_cache import cache_folder
@@ -95,8 +95,10 @@ class KeptCounts:
         shared = {part for text in texts.values() for part in text.shared}
         with self._usable():
             if self._open is not None and texts:
-                self._keep('counts', [(key, each.text) for key, each in texts.items()])
-                self._keep('shared', list(shared))
+                of_bags = [(key, self._today, each.text) for key, each in texts.items()]
+                self._open.executemany('INSERT OR REPLACE INTO counts VALUES (?, ?, ?)', of_bags)
+                named = [(part.name, self._today, part.text) for part in shared]
+                self._open.executemany('INSERT OR REPLACE INTO shared VALUES (?, ?, ?)', named)
 
     def close(self) -> None:
         """Write what is new. What is old goes then."""
@@ -109,12 +111,6 @@ class KeptCounts:
                         self._open.execute(gone, (last_day,))
                 self._open.commit()
                 self._open.close()
-
-    def _keep(self, table: str, texts: Sequence[Tuple[Union[bytes, str], str]]) -> None:
-        if self._open is not None:
-            rows = [(key, self._today, text) for key, text in texts]
-            kept = 'INSERT OR REPLACE INTO {} VALUES (?, ?, ?)'.format(table)
-            self._open.executemany(kept, rows)
 
     @contextmanager
     def _usable(self) -> Iterator[None]:

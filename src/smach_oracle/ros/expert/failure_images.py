@@ -14,10 +14,11 @@ from smach_oracle.msg import FailureFrames
 from smach_oracle.oracle.asking.question import Question
 
 from ..connections import quiet_at_shutdown
+from ..images import colour_of
 from ..log.said_once import warn_once
 from ..replay.known_topics import KnownTopics
 from ..replay.replay_settings import CAMERA_TYPES, camera_topics
-from ..replay.small_images import CameraMessage
+from ..replay.small_images import CameraMessage, jpeg_of
 
 TOPIC = '~failure_frames'
 JPEG_QUALITY = 85
@@ -91,13 +92,4 @@ def compressed(image: CameraMessage) -> CompressedImage:
     """
     if not isinstance(image, Image):
         return image
-    import cv2  # takes a moment, and is wanted only where there are cameras
-
-    from ..images import colour_of
-
-    done, data = cv2.imencode(
-        '.jpg', colour_of(image)[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
-    )
-    if not done:
-        raise ValueError('it cannot be encoded')
-    return CompressedImage(image.header, 'jpeg', bytes(data))
+    return jpeg_of(colour_of(image), image.header, JPEG_QUALITY)

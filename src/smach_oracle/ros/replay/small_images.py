@@ -5,6 +5,7 @@ from typing import Optional, Tuple, Union
 
 import numpy as np
 from sensor_msgs.msg import CompressedImage, Image
+from std_msgs.msg import Header
 
 from ..images import ImageError, colour_of
 
@@ -37,12 +38,23 @@ def small_jpeg(message: CameraMessage, width: int) -> CompressedImage:
         colour = cv2.resize(
             colour, (width, max(1, round(height * width / original))), interpolation=cv2.INTER_AREA
         )
+    return jpeg_of(colour, message.header, JPEG_QUALITY)
+
+
+def jpeg_of(colour: np.ndarray, header: Header, quality: int) -> CompressedImage:
+    """Return a JPEG of an image in colour: rows, columns, RGB of uint8.
+
+    :param quality: 0 to 100.
+    :raises ImageError: where it cannot be encoded.
+    """
+    import cv2
+
     done, data = cv2.imencode(
-        '.jpg', np.ascontiguousarray(colour[:, :, ::-1]), [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+        '.jpg', np.ascontiguousarray(colour[:, :, ::-1]), [cv2.IMWRITE_JPEG_QUALITY, quality]
     )
     if not done:
         raise ImageError('the image cannot be encoded')
-    return CompressedImage(message.header, 'jpeg', bytes(data))
+    return CompressedImage(header, 'jpeg', bytes(data))
 
 
 def compressed_size(data: bytes) -> Optional[Tuple[int, int]]:

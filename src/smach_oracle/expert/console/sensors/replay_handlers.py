@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 import tornado.web
 
 from ..web.access import ClientRateLimits
-from ..web.handlers import SignedInHandler
+from ..web.handlers import PathOnlyHandler
 from .images import USUAL_WIDTH, encode_image
 from .question_replays import KeptReplay, QuestionReplays
 
@@ -23,16 +23,8 @@ class ReplayRequests:
         self.workers = ThreadPoolExecutor(1, 'replays')
 
 
-class _ReplayBase(SignedInHandler):
-    """Has no arguments but the numbers."""
-
+class _ReplayBase(PathOnlyHandler):
     _shared: ReplayRequests
-
-    def prepare(self) -> None:
-        """Check access and who it is. Refuse arguments."""
-        super().prepare()
-        if self.request.query_arguments:
-            raise tornado.web.HTTPError(400)
 
     def found(self, number: str) -> KeptReplay:
         """Return a replay.

@@ -7,7 +7,7 @@ import tornado.web
 
 from ..sensors.question_images import ImageStore
 from ..web.access import ClientRateLimits
-from ..web.handlers import SignedInHandler
+from ..web.handlers import PathOnlyHandler
 from .bag_catalogue import RecordedTrialError
 from .recorded_trials import RecordedTrials
 
@@ -22,16 +22,8 @@ class HistoryRequests:
         self.workers = ThreadPoolExecutor(1, 'bags')
 
 
-class _HistoryHandler(SignedInHandler):
-    """Has no arguments but the number."""
-
+class _HistoryHandler(PathOnlyHandler):
     _shared: HistoryRequests
-
-    def prepare(self) -> None:
-        """Check access and who it is. Refuse arguments."""
-        super().prepare()
-        if self.request.query_arguments:
-            raise tornado.web.HTTPError(400)
 
 
 class RecordedHandler(_HistoryHandler):

@@ -119,6 +119,16 @@ class SignedInHandler(CheckedHandler):
         self.finish(shortened(str(err), 500))
 
 
+class PathOnlyHandler(SignedInHandler):
+    """Has no arguments but those in its path."""
+
+    def prepare(self) -> None:
+        """Check access and who it is. Refuse arguments."""
+        super().prepare()
+        if self.request.query_arguments:
+            raise tornado.web.HTTPError(400)
+
+
 class NotFoundHandler(CheckedHandler):
     """Everything else."""
 

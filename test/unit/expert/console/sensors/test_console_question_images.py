@@ -8,7 +8,6 @@ from expert_fixtures import make_question
 from sensor_msgs.msg import CompressedImage
 from std_msgs.msg import Header
 
-from smach_oracle.expert import robot_topics
 from smach_oracle.expert.console.answering import precondition_sections
 from smach_oracle.expert.console.answering.precondition_sections import PreconditionStatuses
 from smach_oracle.expert.console.sensors import question_images
@@ -22,17 +21,7 @@ from smach_oracle.ros.expert.failure_images import compressed
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.images import colour_image
 
-
-class NoTopic:
-    """Hears nothing, and leaves no thread that waits for a master."""
-
-    def __init__(self, *_):
-        pass
-
-
-@pytest.fixture(autouse=True)
-def no_master(monkeypatch):
-    monkeypatch.setattr(robot_topics, 'RobotTopic', NoTopic)
+pytestmark = pytest.mark.usefixtures('no_master')
 
 
 def listed(monkeypatch, robot='/alpha', asked_s=100.0, query_id='q1', stamp_s=1):

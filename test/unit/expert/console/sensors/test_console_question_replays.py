@@ -12,7 +12,6 @@ from expert_fixtures import make_question
 from sensor_msgs.msg import CompressedImage, JointState
 from std_msgs.msg import Header
 
-from smach_oracle.expert import robot_topics
 from smach_oracle.expert.console.sensors import question_replays
 from smach_oracle.expert.console.sensors.question_replays import QuestionReplays, kept_replay
 from smach_oracle.expert.console.web.sections import PageSections
@@ -20,20 +19,9 @@ from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.msg import FailureReplay, OpenQuery, OracleEvent
 from smach_oracle.ros.expert.question_messages import to_goal
 
+pytestmark = pytest.mark.usefixtures('no_master')
 AT_S = 1000
 JPEG = bytes(cv2.imencode('.jpg', np.full((24, 32, 3), 120, np.uint8))[1])
-
-
-class NoTopic:
-    """Hears nothing, and leaves no thread that waits for a master."""
-
-    def __init__(self, *_):
-        pass
-
-
-@pytest.fixture(autouse=True)
-def no_master(monkeypatch):
-    monkeypatch.setattr(robot_topics, 'RobotTopic', NoTopic)
 
 
 def replay_message(query_id='q1', images=((0, -1.0),), data=JPEG, **more):
