@@ -13,7 +13,7 @@ from ..checkpoint.resuming import tell_resumed
 from ..checkpoint.trial_store import TrialStore, open_store
 from ..machine.execution import Execution, ends_program, why_no_outcome
 from ..machine.nesting import nodes_of, settle_ways
-from ..machine.oracle import save_rates
+from ..machine.oracle import load_rates, save_rates
 from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
@@ -65,10 +65,10 @@ class ContainerRun(Execution):
 
     def _begin_trial(self, new_trial_id: Callable[[], str]) -> None:
         node = self._node
-        adopt(node.machine)
-        nodes = list(nodes_of(node.machine))
+        nodes = adopt(node.machine)
         for each in nodes:
             bring_up_to_date(each)
+        load_rates(node)
         if node.tree.recover:
             node.tree.health.use(node.settings.healthy, node.settings.health_settle_s)
         store = self._store = open_store(node)

@@ -1,6 +1,6 @@
 """Puts a machine, and those nested in it, under one oracle each, and takes them out again."""
 
-from typing import Any, List, NamedTuple, Optional
+from typing import Any, Dict, List, NamedTuple, Optional
 
 import smach
 
@@ -8,7 +8,7 @@ from ..asking.question import names
 from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError, TrialError
 from ..identity import set_class
-from ..machine.nesting import containers_in, machines_below, nodes_of
+from ..machine.nesting import containers_in, holds_containers, machines_below, nodes_of
 from ..machine.oracle import load_rates
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, marked_node, node_of
@@ -73,6 +73,7 @@ def _put_in_order(machine: smach.StateMachine, arguments: WrapArguments) -> None
         node.in_force.strict = arguments.strict
     for node in nodes_of(machine):
         bring_up_to_date(node)
+    load_rates(top)
 
 
 def bring_up_to_date(node: TreeNode) -> None:
@@ -80,14 +81,12 @@ def bring_up_to_date(node: TreeNode) -> None:
 
     :raises SettingsError: where the settings do not fit them.
     """
-    sync_oracle(node)
-    states = len(states_of(node.machine))
-    if node.in_force.checked_states != states:
+    if node.in_force.checked_states != len(states_of(node.machine)):
+        sync_oracle(node)
         if node.parent is None:
             check_names(node)
         check_preconditions(node)
-        node.in_force.checked_states = states
-    load_rates(node)
+        node.in_force.checked_states = len(states_of(node.machine))
 
 
 def _configure(machine: smach.StateMachine, settings: Settings) -> None:
@@ -119,14 +118,24 @@ def _wrap_again(
     return machine
 
 
-def adopt(machine: smach.StateMachine) -> None:
+def adopt(machine: smach.StateMachine) -> List[TreeNode]:
     """Wrap what is nested in a wrapped machine and is not wrapped yet, into one tree with it.
+
+    It returns the node of each container of the tree once. Each trial begins with this.
 
     :raises SettingsError: for a machine whose class cannot be extended.
     """
-    parent = marked_node(machine)
+    found: Dict[int, TreeNode] = {}
+    _adopt_below(marked_node(machine), found)
+    return list(found.values())
+
+
+def _adopt_below(parent: TreeNode, found: Dict[int, TreeNode]) -> None:
+    found[id(parent)] = parent
+    if not holds_containers(parent.machine):
+        return
     place_gates(parent, adopt_branches(parent))
-    for below, child in machines_below(machine):
+    for below, child in machines_below(parent.machine):
         node = node_of(child)
         if node is None:
             if not parent.wraps(below):
@@ -137,7 +146,8 @@ def adopt(machine: smach.StateMachine) -> None:
         if node.parent is None or node.tree is not parent.tree:
             _move_below(node, parent, below)
         node.in_force.nested = parent.in_force.nested
-        adopt(node.machine)
+        if id(node) not in found:
+            _adopt_below(node, found)
 
 
 def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:

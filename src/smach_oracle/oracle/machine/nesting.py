@@ -102,6 +102,14 @@ def _containers_of(container: object) -> List[Tuple[str, smach.Container]]:
     ]
 
 
+def holds_containers(container: object) -> bool:
+    """Whether one of its states is a container. Most machines have none."""
+    for state in list(children_of(container).values()):  # a plain loop: each trial asks it of all
+        if isinstance(state, smach.Container):
+            return True
+    return False
+
+
 def paths_below(container: object, above: Labels = ()) -> Iterator[str]:
     """Yield the paths of what may have an oracle of its own, at any depth.
 

@@ -43,6 +43,7 @@ class RateReading(NamedTuple):
     tried: str  # what the oracle did after its latest failure, '' where it has succeeded since
 
 
+_NOTHING_TRIED = '', 0
 _ENDS = object()  # no transition is drawn to it, so no machine goes on by it
 
 
@@ -86,7 +87,7 @@ class StateRecord:
         # s, of the visits that ended by themselves and were timed, a plain success that nobody
         # observes is not
         self.longest_s: Optional[float] = None
-        self._tried = '', 0
+        self._tried = _NOTHING_TRIED
         self.entered_by_oracle = False  # at the coming visit
         # at the coming visit: the state in which each container below it begins
         self.way_down: Tuple['TreePlace', ...] = ()
@@ -246,8 +247,9 @@ class StateRecord:
     def begin_trial(self) -> None:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
-        self._tried = '', 0
-        self.settle_way(None)
+        self._tried = _NOTHING_TRIED
+        if self._ways.gone is not None:
+            self.settle_way(None)
         if self.special:
             self.forget_entry()  # of a trial that ended before the visit
         self._visits_before = self._visits + self._by_edges()
