@@ -14,15 +14,15 @@ import threading
 import traceback
 import weakref
 from types import MethodType
-from typing import Callable, Dict, List, Set, Tuple
+from typing import Any, Callable, Dict, List, Set, Tuple
 
 _ENDING = (signal.SIGINT, signal.SIGTERM)
 
 Decision = Callable[[], None]
 
 _of_functions: List[Decision] = []
-# by owner and name: an owner that is gone needs no decision
-_of_objects: Dict[Tuple[int, str], 'weakref.WeakMethod[Decision]'] = {}
+# by the id of the owner and the name of its method: an owner that is gone needs no decision
+_of_objects: Dict[Tuple[int, str], 'weakref.ref[object]'] = {}
 _masks: Dict[int, Set[int]] = {}  # of threads that fork now, as they were before
 _forked = False
 
@@ -38,11 +38,12 @@ def in_child(decision: Decision) -> None:
         return
     key = id(decision.__self__), decision.__name__
 
-    def forget(gone: object) -> None:
-        if _of_objects.get(key) is gone:
-            del _of_objects[key]
+    # the default is there when the process ends too, the module's own name is not
+    def forget(gone: object, kept: Dict[Tuple[int, str], Any] = _of_objects) -> None:
+        if kept.get(key) is gone:
+            del kept[key]
 
-    _of_objects[key] = weakref.WeakMethod(decision, forget)
+    _of_objects[key] = weakref.ref(decision.__self__, forget)
 
 
 def is_child() -> bool:
@@ -88,8 +89,9 @@ def _decide() -> None:
     _forked = True
     mask = _masks.pop(threading.get_ident())
     _masks.clear()
-    methods = [reference() for reference in list(_of_objects.values())]
-    for decision in _of_functions + [method for method in methods if method is not None]:
+    owners = [(owner(), name) for (_, name), owner in list(_of_objects.items())]
+    methods = [getattr(owner, name) for owner, name in owners if owner is not None]
+    for decision in _of_functions + methods:
         try:
             decision()
         except Exception:  # the others are due anyway
