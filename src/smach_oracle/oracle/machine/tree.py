@@ -62,7 +62,6 @@ class Tree:
         self.trials = 0  # begun
         # whether a state is guarded (`on_retry`), so that visits are numbered
         self.numbers_visits = False
-        self._visits = itertools.count(1)
         self.trial_id = ''
         self.is_resumed = False  # whether the trial goes on after its program was stopped
         self.rates_loaded = ''  # the rates file read last
@@ -76,6 +75,7 @@ class Tree:
     ) -> None:
         """Have nothing under way, nothing asked by an operator, and locks that nobody holds."""
         clock = self.clock = TreeClock(Clock())
+        self._visits = itertools.count(1)
         self.expert = expert
         # has a store keep which states have begun, at once, where there is no event of it
         self.keep_marks: Callable[[], None] = no_store
