@@ -1,12 +1,15 @@
 """The source tree, for the tests that hold the house rules."""
 
 import ast
+import atexit
 import functools
+import gc
 import re
 import subprocess
 from pathlib import Path
 from typing import Iterator, List, Tuple
 
+atexit.register(gc.unfreeze)  # what `parse` takes from the collector
 ROOT = Path(__file__).resolve().parents[3]
 SOURCES = ('src', 'scripts', 'test', 'benchmarks', 'examples', 'cmake')
 # the commands that catkin also puts into bin/, which is on the PATH
@@ -66,18 +69,31 @@ def shown(path: Path) -> str:
 @functools.lru_cache(maxsize=None)
 def parse(path: Path) -> ast.Module:
     """The syntax tree of `path`, as Python 3.8 reads it; read once, so not to be changed."""
-    return ast.parse(path.read_text(encoding='utf-8'), shown(path), feature_version=(3, 8))
+    tree = ast.parse(path.read_text(encoding='utf-8'), shown(path), feature_version=(3, 8))
+    gc.freeze()  # the trees stay: a collection would go through them all and find nothing
+    return tree
 
 
-def imports(path: Path) -> Iterator[Tuple[int, str]]:
+@functools.lru_cache(maxsize=None)
+def nodes(path: Path) -> Tuple[ast.AST, ...]:
+    """All nodes of the syntax tree of `path`, in the order of ast.walk."""
+    return tuple(ast.walk(parse(path)))
+
+
+@functools.lru_cache(maxsize=None)
+def imports(path: Path) -> Tuple[Tuple[int, str], ...]:
     """Every module that `path` imports, anywhere in it, as (line, dotted name); relative names are
     made absolute.
 
     ``from a import b`` gives ``a.b``: only that tells ``from smach_oracle import ros`` from an
     import of the top.
     """
+    return tuple(_imports(path))
+
+
+def _imports(path: Path) -> Iterator[Tuple[int, str]]:
     parts = path.relative_to(ROOT).with_suffix('').parts[1:]
-    for node in ast.walk(parse(path)):
+    for node in nodes(path):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 yield node.lineno, alias.name

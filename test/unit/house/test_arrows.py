@@ -4,6 +4,7 @@ runs anywhere.
 
 import ast
 import collections
+import functools
 import re
 import subprocess
 import sys
@@ -30,7 +31,7 @@ from arrows import (
     ours,
     told,
 )
-from house import ROOT, imports, parse, python_files, shown
+from house import ROOT, imports, nodes, python_files, shown
 from layers import LAYERS
 
 MAX_MODULES = 20  # in a package, its __init__ not counted
@@ -156,11 +157,12 @@ def module_of(name: str, modules: Dict[str, Path]) -> str:
     return name
 
 
+@functools.lru_cache(maxsize=None)
 def for_types_alone(path: Path) -> Set[int]:
     """The lines under `if TYPE_CHECKING`, which are not run."""
     return {
         inner.lineno
-        for node in ast.walk(parse(path))
+        for node in nodes(path)
         if isinstance(node, ast.If)
         and isinstance(node.test, ast.Name)
         and node.test.id == 'TYPE_CHECKING'

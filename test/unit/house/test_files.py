@@ -7,7 +7,7 @@ import ast
 import collections
 import re
 
-from house import ROOT, parse, python_files, shown, tracked_text
+from house import ROOT, nodes, python_files, shown, tracked_text
 
 EVERYTHING = python_files()
 PRODUCT = python_files('src', 'scripts', 'benchmarks')
@@ -19,7 +19,7 @@ def found(paths, is_wrong):
     return [
         '{}:{}'.format(shown(path), node.lineno)
         for path in paths
-        for node in ast.walk(parse(path))
+        for node in nodes(path)
         if hasattr(node, 'lineno') and is_wrong(node)
     ]
 
@@ -41,7 +41,7 @@ def test_there_is_one_restricted_unpickler_and_it_decides_what_it_admits():
     classes = [
         (path, node)
         for path in PRODUCT
-        for node in ast.walk(parse(path))
+        for node in nodes(path)
         if isinstance(node, ast.ClassDef)
         and any('Unpickler' in ast.dump(base) for base in node.bases)
     ]

@@ -5,7 +5,7 @@ import re
 from typing import Dict, Iterator, List, Set
 
 import pytest
-from house import ROOT, parse
+from house import ROOT, nodes, parse
 
 EXECUTIVE = ROOT / 'src/smach_oracle/oracle'
 TESTS = ROOT / 'test/unit/oracle'
@@ -61,7 +61,7 @@ def writers() -> Dict[str, Set[str]]:
     """The modules of the executive by what they write."""
     found: Dict[str, Set[str]] = {}
     for path in sorted(EXECUTIVE.rglob('*.py')):
-        for node in ast.walk(parse(path)):
+        for node in nodes(path):
             for name in written(node):
                 found.setdefault(name, set()).add(str(path.relative_to(EXECUTIVE)))
     return found
@@ -113,7 +113,7 @@ def test_no_module_but_its_own_writes_a_field_of_a_tree_node():
     found = [
         (path.name, each.lineno, each.attr)
         for path in sorted(EXECUTIVE.rglob('*.py'))
-        for each in ast.walk(parse(path))
+        for each in nodes(path)
         if path != own
         and isinstance(each, ast.Attribute)
         and isinstance(each.ctx, (ast.Store, ast.Del))

@@ -1,11 +1,12 @@
 """The tests themselves: each asserts something, and waits for what it means."""
 
 import ast
+import functools
 import io
 import tokenize
 
 import pytest
-from house import imports, parse, python_files, shown
+from house import imports, nodes, parse, python_files, shown
 
 # what made the test data is kept as it was then
 FILES = [path for path in python_files('test') if 'data' not in path.parts]
@@ -29,6 +30,12 @@ def functions(tree):
     return [
         node for node in ast.walk(tree) if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef))
     ]
+
+
+@functools.lru_cache(maxsize=None)
+def functions_of(path):
+    """All functions of a file."""
+    return functions(parse(path))
 
 
 def calls(node):
@@ -58,14 +65,14 @@ def helpers_of(path):
         node.name: node
         for each in beside
         if each.is_file()
-        for node in functions(parse(each))
+        for node in functions_of(each)
         if not node.name.startswith('test_')
     }
 
 
 def without_assertion(path):
     """The tests of a file in which nothing is asserted."""
-    tests = [node for node in functions(parse(path)) if node.name.startswith('test_')]
+    tests = [node for node in functions_of(path) if node.name.startswith('test_')]
     helpers = helpers_of(path) if tests else {}
     return [node.name for node in tests if not asserts(node, helpers)]
 
@@ -105,7 +112,7 @@ def made_empty(path):
     """Lines of calls of `__new__`, other than that of a class above the one at hand."""
     return [
         node.lineno
-        for node in ast.walk(parse(path))
+        for node in nodes(path)
         if isinstance(node, ast.Call)
         and isinstance(node.func, ast.Attribute)
         and node.func.attr == '__new__'
