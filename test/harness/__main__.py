@@ -26,9 +26,10 @@ from checks import (
 )
 from processes import Runner
 from report import Outcome, on_upstream, second_attempts, write_junit
-from schedule import GROUPS, ROWS, run_side_by_side
+from schedule import WORKERS, rows_of, run_side_by_side
 from upstream import UpstreamError, environment
 
+GROUPS = ('bench', 'lint', 'package', 'ros', 'unit', 'upstream')
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -65,7 +66,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument(
         'group',
         nargs='?',
-        choices=GROUPS + ['all'],
+        choices=[*GROUPS, 'all'],
         default='all',
         help='lint: style, types, launch files; unit: no ROS master; ros: rostests; '
         'upstream: on the engine of --upstream; package: build and install; bench: limits on '
@@ -77,7 +78,11 @@ def parse_arguments() -> argparse.Namespace:
         default='',
         help='only checks with this in their name; * is a wildcard',
     )
-    parser.add_argument('--jobs', type=int, help='checks at a time (default: 3, benchmarks 1)')
+    parser.add_argument(
+        '--jobs',
+        type=int,
+        help="checks at a time (default: {}, benchmarks of the wall's time 1)".format(len(WORKERS)),
+    )
     parser.add_argument(
         '--upstream',
         metavar='PATH',
@@ -127,16 +132,14 @@ def main() -> int:
     started = time.monotonic()
     outcomes: List[Outcome] = []
     try:
-        for row in ROWS:
-            checks: Dict[str, Check] = {}
-            for group in row.groups:
-                if arguments.group in ('all', group):
-                    checks.update(find_checks(group, arguments.upstream, arguments.python))
-            checks = select(checks, arguments.pattern)
-            if checks:
-                jobs = arguments.jobs or row.jobs
-                print('--- {} checks, {} at a time'.format(len(checks), jobs))
-                outcomes += run_side_by_side(checks, bench, jobs)
+        checks: Dict[str, Check] = {}
+        for group in GROUPS:
+            if arguments.group in ('all', group):
+                checks.update(find_checks(group, arguments.upstream, arguments.python))
+        for row, jobs in rows_of(select(checks, arguments.pattern)):
+            jobs = arguments.jobs or jobs
+            print('--- {} checks, {} at a time'.format(len(row), jobs))
+            outcomes += run_side_by_side(row, bench, jobs)
     except KeyboardInterrupt:
         print('interrupted; what ran has been stopped')
         return 130

@@ -32,12 +32,17 @@ class Bench:
     runner: Runner
 
     def run(
-        self, name: str, command: List[str], timeout_s: float, env: Optional[Dict[str, str]] = None
+        self,
+        name: str,
+        command: List[str],
+        timeout_s: float,
+        env: Optional[Dict[str, str]] = None,
+        gives_way: bool = False,
     ) -> Outcome:
         """Run one command that passes or fails as a whole."""
         log = self.results / 'log' / (name.replace('/', '_').replace(' ', '_') + '.log')
         started = time.monotonic()
-        ended = self.runner.run(command, log, timeout_s, self.root, env)
+        ended = self.runner.run(command, log, timeout_s, self.root, env, gives_way)
         outcome = Outcome(
             name,
             seconds=time.monotonic() - started,
@@ -57,7 +62,7 @@ Attempt = Callable[[], Outcome]
 
 
 def _command(name: str, command: List[str], bench: Bench, timeout_s: float = 300.0) -> Outcome:
-    return bench.run(name, command, timeout_s)
+    return bench.run(name, command, timeout_s, gives_way=True)
 
 
 def lint_checks(root: Path) -> Dict[str, Check]:
@@ -120,7 +125,7 @@ def _pytest(
         str(result),
         'test/' + name,
     ]
-    return _with_junit(bench.run(shown, command, MAX_PYTEST_S, env), [result])
+    return _with_junit(bench.run(shown, command, MAX_PYTEST_S, env, gives_way=True), [result])
 
 
 def _with_junit(outcome: Outcome, results: List[Path]) -> Outcome:

@@ -1,34 +1,44 @@
 """Which checks run side by side, and in which order.
 
 Rostests wait most of their time: for nodes that start, for time to pass, for masters that come
-back. All others compute. On two cores one that computes runs beside two that wait. Benchmarks run
-alone, at the end.
+back. All others compute. Two that wait run beside two that compute. Those give way
+(`processes.NICE`), so that a rostest finds the machine as if it were idle, and no core is.
+Benchmarks of the wall's time run alone, at the end.
 """
 
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from threading import Lock
-from typing import Dict, List, Mapping, NamedTuple, Sequence, Tuple
+from typing import Dict, List, Mapping, Sequence, Tuple
 
 from checks import Bench, Check
 from report import Outcome, show
 
-COMPUTES, WAITS = 'computes', 'waits'
-# what each worker takes: the second kind where none of the first is left. So two compute side by
-# side at most
-THREE_WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES), (WAITS,))
+COMPUTES, WAITS, ALONE = 'computes', 'waits', 'alone'
+# what each worker takes: the second kind where none of the first is left
+WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES), (COMPUTES, WAITS), (WAITS, COMPUTES))
 MORE = (WAITS, COMPUTES)
-
-
-class Row(NamedTuple):
-    """Groups of checks that run side by side."""
-
-    groups: Tuple[str, ...]
-    jobs: int  # checks at a time
-
-
-ROWS = (Row(('lint', 'unit', 'ros', 'package', 'upstream'), 3), Row(('bench',), 1))
-GROUPS = sorted(group for row in ROWS for group in row.groups)
+# benchmarks that need no machine of their own: they count faults, memory or processor time. Most of
+# the last hold it against a yardstick of the same run, of which the best or median round counts
+BESIDE_OTHERS = tuple(
+    'benchmarks/' + name
+    for name in (
+        'borders',
+        'checkpoint',
+        'containers',
+        'count_bags',
+        'introspection',
+        'killed',
+        'mark_latency',
+        'oracle_decision',
+        'oracle_memory',
+        'oracle_overhead',
+        'random_trees',
+        'recorder_throughput',
+        'smach_engine',
+        'trial_speed',
+    )
+)
 # those with most to compute are begun first, so that none of them is left alone at the end
 LONGEST = (
     'unit/simulation',
@@ -38,19 +48,37 @@ LONGEST = (
     'unit/borders',
     'unit/pr2',
     'unit/house',
+    'benchmarks/trial_speed',
     'unit/analysis',
     'unit/scripted_operator',
     'mypy',
     'unit/expert',
     'rostest/task_cluster',
     'rostest/task_experiment',
+    'rostest/oracle_programs_built',
+    'rostest/oracle_programs_nested',
+    'rostest/oracle_programs_served',
+    'rostest/oracle_programs_threads',
+    'rostest/task_sharing',
     'rostest/console_teleoperation',
+    'rostest/console_live',
+    'rostest/lab_that_goes_on',
+    'rostest/console_worn',
 )
 
 
 def kind_of(name: str) -> str:
-    """Whether the check of this name computes or waits most of its time."""
-    return WAITS if 'rostest/' in name else COMPUTES
+    """Whether the check of this name computes or waits most of its time, or must run alone."""
+    if 'rostest/' in name:
+        return WAITS
+    return COMPUTES if not name.startswith('benchmarks/') or name in BESIDE_OTHERS else ALONE
+
+
+def rows_of(checks: Mapping[str, Check]) -> List[Tuple[Dict[str, Check], int]]:
+    """Return checks in the order of their rows, and how many of each row run at a time."""
+    alone = {name: check for name, check in checks.items() if kind_of(name) == ALONE}
+    beside = {name: check for name, check in checks.items() if name not in alone}
+    return [row for row in ((beside, len(WORKERS)), (alone, 1)) if row[0]]
 
 
 class Queues:
@@ -60,8 +88,9 @@ class Queues:
         self._lock = Lock()
         self._left: Dict[str, List[str]] = {COMPUTES: [], WAITS: []}
         for name in [each for each in LONGEST if each in names] + list(names):
-            if name not in self._left[kind_of(name)]:
-                self._left[kind_of(name)].append(name)
+            left = self._left[WAITS if kind_of(name) == WAITS else COMPUTES]
+            if name not in left:
+                left.append(name)
 
     def take(self, kinds: Sequence[str]) -> str:
         """Return the next check of the first of these kinds that has any left, else ''."""
@@ -87,7 +116,7 @@ def run_side_by_side(checks: Mapping[str, Check], bench: Bench, jobs: int) -> Li
                 show(outcome)
                 sys.stdout.flush()
 
-    workers = (*THREE_WORKERS, *[MORE] * jobs)[:jobs]
+    workers = (*WORKERS, *[MORE] * jobs)[:jobs]
     with ThreadPoolExecutor(jobs) as pool:
         ends = [pool.submit(work, kinds) for kinds in workers]
         try:

@@ -13,6 +13,7 @@ from waiting import wait_for
 sys.path.insert(0, str(ROOT / 'test/harness'))
 
 import checks
+import processes
 import schedule
 import upstream
 from checks import (
@@ -126,15 +127,60 @@ def test_the_processor_time_is_that_of_the_command_and_of_all_that_it_waits_for(
     assert not hung.ok and hung.processor_s > 0.1
 
 
-def test_the_first_computes_the_second_waits_and_the_third_does_nothing_else():
+def test_two_compute_two_wait_and_each_does_the_other_where_its_own_are_done():
     names = ['ruff', 'rostest/a', 'unit/x', 'unit/y', 'rostest/b', 'upstream/rostest/c']
     queues = schedule.Queues(names)
-    first, second, third = schedule.THREE_WORKERS
-    assert [queues.take(each) for each in (first, second, third)] == ['ruff', *names[1:5:3]]
-    assert [queues.take(each) for each in (third, third)] == [names[5], '']
-    assert [queues.take(each) for each in (second, first, first)] == ['unit/x', 'unit/y', '']
+    first, second, third, fourth = schedule.WORKERS
+    taken = [queues.take(each) for each in (first, second, third, fourth)]
+    assert taken == ['ruff', 'rostest/a', 'unit/x', 'rostest/b']
+    assert [queues.take(each) for each in (second, second, fourth)] == [names[5], 'unit/y', '']
     queues = schedule.Queues(names[:2])
     assert [queues.take(first) for _ in range(3)] == ['ruff', 'rostest/a', '']
+
+
+def test_benchmarks_of_the_walls_time_run_alone_at_the_end():
+    there = benchmark_checks(ROOT)
+    assert set(schedule.BESIDE_OTHERS) <= set(there)
+    (beside, jobs), (alone, one) = schedule.rows_of({**there, 'rostest/a': None, 'unit/x': None})
+    assert set(beside) == {'rostest/a', 'unit/x', *schedule.BESIDE_OTHERS} and jobs == 4
+    assert set(alone) == set(there) - set(beside) and one == 1
+    queues = schedule.Queues(list(alone))
+    assert sorted(iter(lambda: queues.take(schedule.WORKERS[0]), '')) == sorted(alone)
+    assert [list(row) for row, _ in schedule.rows_of({'unit/x': None})] == [['unit/x']]
+
+
+SHARE = """
+import os, pathlib, time
+end = time.monotonic() + 20.0
+while time.monotonic() < end and os.getpriority(os.PRIO_PROCESS, 0) != {0}: time.sleep(0.01)
+session = pathlib.Path('/proc/self/autogroup')
+while time.monotonic() < end and session.exists():
+    if 'nice {0}' in session.read_text(): break
+    time.sleep(0.01)
+print(time.monotonic() < end)
+"""
+
+
+def test_what_computes_gives_way_and_a_rostest_does_not(bench, monkeypatch):
+    command = [sys.executable, '-c', SHARE.format(processes.NICE)]
+    bench.run('giving', command, 30.0, gives_way=True)
+    assert (bench.results / 'log/giving.log').read_text() == 'True\n'
+    given = {}
+
+    def run(name, *_, gives_way=False, **__):
+        given[name] = gives_way
+        return Outcome(name, passed=1)
+
+    monkeypatch.setattr(bench, 'run', run)
+    (bench.root / 'test/rostest').mkdir(parents=True)
+    (bench.root / 'test/rostest/one.test').touch()
+    for check in (
+        *lint_checks(ROOT).values(),
+        *pytest_checks(ROOT, 'unit').values(),
+        *rostest_checks(bench.root).values(),
+    ):
+        check(bench)
+    assert [name for name, gives_way in given.items() if not gives_way] == ['rostest/one']
 
 
 def test_the_longest_begin_and_each_runs_once():
@@ -151,6 +197,7 @@ def test_the_longest_are_checks_that_there_are():
         **pytest_checks(ROOT, 'unit'),
         **pytest_checks(ROOT, 'package'),
         **rostest_checks(ROOT),
+        **benchmark_checks(ROOT),
     }
     assert schedule.LONGEST and set(schedule.LONGEST) <= set(there)
 
