@@ -398,6 +398,25 @@ def test_rates_read_from_another_thread_while_the_machine_runs_are_counted_once(
     assert {row.state: row.successes for row in wrapped.rates()} == {'A': 20000, 'B': 19999}
 
 
+def test_a_record_that_a_reader_of_rates_makes_too_late_replaces_none(monkeypatch):
+    from smach_oracle.oracle.machine import container_records
+
+    wrapped = OracleContainer.wrap(chain_of(Scripted('succeeded')))
+    make, outcomes = container_records.StateRecord, []
+
+    def late(*args, **kwargs):
+        record = make(*args, **kwargs)
+        if not outcomes:  # of the reader, which stands here until the machine has ended
+            outcomes.append('')
+            outcomes[0] = wrapped.execute()
+        return record
+
+    monkeypatch.setattr(container_records, 'StateRecord', late)
+    assert [row.successes for row in wrapped.rates()] == [1]
+    assert outcomes == ['done']
+    assert [row.successes for row in wrapped.rates()] == [1]
+
+
 def test_recoveries_of_a_nested_machine_are_those_of_the_present_trial():
     import smach
 

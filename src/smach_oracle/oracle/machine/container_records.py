@@ -95,12 +95,17 @@ class ContainerRecords:
         self.to_come: Dict[str, Dict[str, object]] = {}
 
     def make(self, label: str, settings: StateSettings, special: bool) -> StateRecord:
-        """Make the record of a state, with what a rates file says of it."""
-        record = self.by_label[label] = StateRecord(label, settings, special)
-        learned = self.to_come.pop(label, None)
+        """Make the record of a state, with what a rates file says of it.
+
+        Another thread, which reads rates, may make it meanwhile. Then that one holds.
+        """
+        record = StateRecord(label, settings, special)
+        learned = self.to_come.get(label)
         if learned is not None:
             record.restore(learned)
             record.shared = base_of(learned)
+        record = self.by_label.setdefault(label, record)
+        self.to_come.pop(label, None)
         return record
 
     def learned(self) -> Dict[str, object]:
