@@ -1,7 +1,7 @@
 """Which checks run side by side, and in which order.
 
 Rostests wait most of their time: for nodes that start, for time to pass, for masters that come
-back. All others compute. Two that wait run beside two that compute. Those give way
+back. All others compute. Three that wait run beside two that compute. Those give way
 (`processes.NICE`), so that a rostest finds the machine as if it were idle, and no core is.
 Benchmarks of the wall's time run alone, at the end.
 """
@@ -16,7 +16,7 @@ from report import Outcome, show
 
 COMPUTES, WAITS, ALONE = 'computes', 'waits', 'alone'
 # what each worker takes: the second kind where none of the first is left
-WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES), (COMPUTES, WAITS), (WAITS, COMPUTES))
+WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES)) * 2 + ((WAITS, COMPUTES),)
 MORE = (WAITS, COMPUTES)
 # benchmarks that need no machine of their own: they count faults, memory or processor time. Most of
 # the last hold it against a yardstick of the same run, of which the best or median round counts
