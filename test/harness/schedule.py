@@ -15,8 +15,9 @@ from checks import Bench, Check
 from report import Outcome, show
 
 COMPUTES, WAITS, ALONE = 'computes', 'waits', 'alone'
-# what each worker takes: the second kind where none of the first is left
-WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES)) * 2 + ((WAITS, COMPUTES),)
+# what each worker takes: the second kind where none of the first is left. So three compute side by
+# side at most
+WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES), (COMPUTES, WAITS), (WAITS,), (WAITS,))
 MORE = (WAITS, COMPUTES)
 # benchmarks that need no machine of their own: they count faults, memory or processor time. Most of
 # the last hold it against a yardstick of the same run, of which the best or median round counts
