@@ -18,7 +18,9 @@ from typing import Dict, Iterable, Iterator, List, NamedTuple, Tuple
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT / 'src'))
 
-from smach_oracle.expert.console.commands.driving import FRAMES  # noqa: E402
+from smach_oracle.expert.console.commands.commands import KINDS  # noqa: E402
+from smach_oracle.expert.console.commands.driving import FRAMES, GRIPPER  # noqa: E402
+from smach_oracle.expert.console.commands.marking import AT_GOAL, FRESH  # noqa: E402
 from smach_oracle.expert.console.web.access import ROLES  # noqa: E402
 from smach_oracle.oracle.decision.failure_rate import FailureClass  # noqa: E402
 from smach_oracle.oracle.records.events import EventKind  # noqa: E402
@@ -30,20 +32,29 @@ SHAPES = CONSOLE / 'shapes'
 SOURCES = [
     *(SHAPES / (name + '.py') for name in ('basics', 'page', 'questions', 'robots')),
     ROOT / 'src/smach_oracle/analysis/graphs/drawn_graph.py',
-    *(SHAPES / (name + '.py') for name in ('trials', 'sensors', 'people')),
+    *(SHAPES / (name + '.py') for name in ('trials', 'sensors', 'people', 'commands')),
 ]
 TARGET = CONSOLE / 'static/js/server.d.ts'
 WIDTH = 100
 HEAD = """\
-// What the server sends: every shape of JSON. Written by doc/write_page_types.py from the types in
-// shapes/. What the page sends is in commands.d.ts. test/unit/expert/console/test_console_types.py
+// What the server sends, and what the page does: every shape of JSON. Written by
+// doc/write_page_types.py from the types in shapes/. test/unit/expert/console/test_console_types.py
 // compares both with what the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 
 export as namespace server;
-export * from './commands';
+
+/** A reply, by the name of its command: `data` is there for those that hold more than words. */
+export interface Reply<Name extends keyof Commands = keyof Commands> {
+  re: number; // the command's number
+  ok: boolean;
+  message: string;
+  data?: Name extends keyof ReplyData ? ReplyData[Name] : never;
+}
+export interface ReplyData { hello: HelloData; mark: Marked; take_wheel: WheelData }
 """
 PLAIN = {'str': 'string', 'int': 'number', 'float': 'number', 'bool': 'boolean', 'None': 'null'}
+PLAIN['object'] = 'unknown'  # plain data of any kind
 
 
 def words(values: Iterable[object]) -> str:
@@ -60,6 +71,9 @@ def quoted(text: str) -> str:
 CLOSED = {
     'Role': words(ROLES),
     'DriveFrame': words(FRAMES),
+    'AnswerKind': words(KINDS),
+    'ImageFrame': words((AT_GOAL, FRESH)),
+    'GripperWish': words(GRIPPER),
     'OutcomeMeaning': words(each.value for each in EndMeaning),
     'TrialEnd': words([each.value for each in TrialEnding] + ['']),
     'EventName': words(each.name.lower() for each in EventKind) + ' | `${number}`',

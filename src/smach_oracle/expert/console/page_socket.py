@@ -23,6 +23,7 @@ from .commands.stored import STORED_COMMANDS
 from .people.people import People
 from .robots.down_machine_hand import DownMachineHand
 from .robots.machine_hand import MachineHand
+from .shapes.commands import HelloDataView
 from .trials.trial_log import TrialLog
 from .web import sessions
 from .web.access import RateLimit, SocketRateLimits, may
@@ -342,7 +343,7 @@ class PageSocket(tornado.websocket.WebSocketHandler):
         self._pages.sockets.add(self)
         self._pages.onlookers.rename(self._number, self._person)
         self._note(command, CommandReply(True))
-        return CommandReply(True, name, {'browser': session.short})
+        return CommandReply(True, name, HelloDataView(browser=session.short))
 
     def _note(self, command: Optional[PageCommand], reply: CommandReply) -> CommandReply:
         """Record in the audit a command that went no further than this socket."""

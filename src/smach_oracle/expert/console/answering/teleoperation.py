@@ -17,6 +17,7 @@ from ...repeating import repeat
 from ..commands.checks import shown
 from ..commands.commands import CommandReply, PageCommand
 from ..feeds.views import number
+from ..shapes.commands import WheelDataView
 from ..shapes.sensors import ManipulationView
 from ..web.audit import Audit, Person
 from ..web.sections import PageSections
@@ -119,7 +120,7 @@ class Teleoperation:
             with self._lock:
                 now_s = time.monotonic()
                 why = client.control.take(DrivingSession(key, page, person, listed, now_s), now_s)
-            reply = CommandReply(not why, why, None if why else {'wheel': page})
+            reply = CommandReply(not why, why, None if why else WheelDataView(wheel=page))
         self._audit.record(person, command.name, reply.ok, reply.message, {}, listed)
         return reply
 

@@ -1,10 +1,18 @@
-// What the server sends: every shape of JSON. Written by doc/write_page_types.py from the types in
-// shapes/. What the page sends is in commands.d.ts. test/unit/expert/console/test_console_types.py
+// What the server sends, and what the page does: every shape of JSON. Written by
+// doc/write_page_types.py from the types in shapes/. test/unit/expert/console/test_console_types.py
 // compares both with what the server does.
 // Times are seconds since the epoch, lengths metres, unless something else is written beside them.
 
 export as namespace server;
-export * from './commands';
+
+/** A reply, by the name of its command: `data` is there for those that hold more than words. */
+export interface Reply<Name extends keyof Commands = keyof Commands> {
+  re: number; // the command's number
+  ok: boolean;
+  message: string;
+  data?: Name extends keyof ReplyData ? ReplyData[Name] : never;
+}
+export interface ReplyData { hello: HelloData; mark: Marked; take_wheel: WheelData }
 
 // --- basics
 
@@ -768,4 +776,194 @@ export interface Reach {
   calls: ByKey<Call[]>;
   next: ByKey<NextCall>;
   failed: FailedCall[]; // the newest last
+}
+
+// --- commands
+
+export type AnswerKind = 'goto' | 'supersede' | 'give_up' | 'interface';
+export type ImageFrame = 'at_goal' | 'fresh';
+export type GripperWish = '' | 'open' | 'close';
+export type Point = [number, number]; // px: right, down
+export type LookedAt = 'trials' | 'people' | ''; // which lists are looked at
+
+/** Who uses the page. */
+export interface Hello {
+  xsrf: string;
+  expert: string;
+}
+
+/** A trial by its id. */
+export interface OfTrial {
+  trial: string;
+}
+
+/** The place that a person looks at. */
+export interface Look {
+  at: LookedAt;
+}
+
+/** A question by its key. */
+export interface OfQuestion {
+  question: string;
+}
+
+/** A value for the userdata. */
+export interface Output {
+  key: string;
+  value: unknown;
+  type: string;
+}
+
+/** An answer to a question. */
+export interface Answer {
+  kind: AnswerKind;
+  name: string;
+  container: string; // path of another one than that of the failed state; '': that one
+  outputs: Output[];
+  why: string;
+}
+
+/** An answer, and its question. */
+export interface AnswerCommand extends OfQuestion, Answer {
+  seen?: number; // the newest beat that the page has had
+}
+
+/** A line on an image, px. */
+export interface Stroke {
+  foreground: boolean;
+  width: number;
+  points: Point[];
+}
+
+/** What is drawn on an image. */
+export interface Mark extends OfQuestion {
+  stamp: string;
+  region: Point[];
+  strokes: Stroke[];
+}
+
+/** The image that is to be drawn on. */
+export interface UseFrame extends OfQuestion {
+  frame: ImageFrame;
+}
+
+/** A question, and why something is done about it. */
+export interface WithReason extends OfQuestion {
+  why: string;
+}
+
+/** The end of the work of an interface. */
+export interface HandOver extends WithReason {
+  outputs?: Output[];
+  seen?: number; // the newest beat that the page has had
+  outcome: string;
+}
+
+/** A machine of a robot, by the path of a container of it; '': all of the robot's. */
+export interface OfMachine {
+  robot: string;
+  path: string;
+}
+
+/** A machine that goes on. */
+export interface Start extends OfMachine {
+  seen?: number; // the newest beat that the page has had
+}
+
+/** States before which a machine pauses. */
+export interface Breakpoint extends OfMachine {
+  pattern: string;
+  remove: boolean;
+}
+
+/** Several robots; none: all that can be held. */
+export interface ManyRobots {
+  robots: string[];
+}
+
+/** A machine that is down, by the key and the moment of its row. */
+export interface OfDown {
+  down: string;
+  moment: number;
+}
+
+/** The state at which it goes on. */
+export interface GoToStored extends OfDown {
+  label: string;
+}
+
+/** A value for its userdata. */
+export interface EditStored extends OfDown {
+  container: string;
+  key: string;
+  json: string;
+}
+
+/** A note for the next shift. */
+export interface WriteNote {
+  text: string;
+}
+
+/** A note by its id. */
+export interface DropNote {
+  note: string;
+}
+
+/** What a person holds. Axes are -1 to 1. */
+export interface DriveWish {
+  held: boolean;
+  linear: Vector; // forward, left, up
+  angular: Vector; // about these
+  gripper: GripperWish;
+}
+
+/** A step of a hand. */
+export interface Drive extends OfQuestion, DriveWish {
+  frame: DriveFrame;
+  arm: string;
+  sent: number; // ms
+}
+
+/** Commands by their names, with their arguments. */
+export interface Commands {
+  hello: Hello;
+  watch: OfTrial;
+  look: Look;
+  claim: OfQuestion;
+  take_over: OfQuestion;
+  release: OfQuestion;
+  pressed: OfQuestion; // its holder is at work
+  view: OfQuestion; // '': at none
+  answer: AnswerCommand;
+  mark: Mark;
+  use_frame: UseFrame;
+  hand_over: HandOver;
+  give_up_interface: WithReason;
+  take_wheel: OfQuestion;
+  leave_wheel: OfQuestion;
+  stop_hand: OfQuestion;
+  stop_machine: OfMachine;
+  pause_machine: OfMachine;
+  stop_robots: ManyRobots;
+  pause_robots: ManyRobots;
+  resume_machine: Start;
+  step_machine: Start;
+  confirm_state: Start;
+  set_breakpoint: Breakpoint;
+  goto_stored: GoToStored;
+  edit_stored: EditStored;
+  drop_stored: OfDown;
+  write_note: WriteNote;
+  drop_note: DropNote;
+  drive: Drive;
+}
+
+/** The session of this browser, in short. */
+export interface HelloData {
+  browser: string;
+}
+
+/** The number under which a page drives. */
+export interface WheelData {
+  wheel: number;
 }
