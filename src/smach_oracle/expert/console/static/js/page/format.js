@@ -17,6 +17,13 @@ export function duration(seconds) {
   return Math.floor(whole / 3600) + ':' + twoDigits(Math.floor((whole % 3600) / 60)) + ' h';
 }
 
+/**
+ * How long ago something was. The frame lets it grow, without another drawing.
+ * @param {number} at s since the epoch
+ * @param {number} now by the server's clock
+ */
+export function since(at, now) { return h('span', { 'data-since': at }, duration(now - at)); }
+
 /** @param {number} number */
 function twoDigits(number) { return String(number).padStart(2, '0'); }
 
@@ -86,7 +93,7 @@ export function rateBar(rate, share, text) {
 }
 
 /**
- * @param {string} text
+ * @param {page.Child} text
  * @param {string} [kind]
  * @param {string} [title]
  */

@@ -2,8 +2,7 @@
 // One robot of the fleet: how it stands, at what it is, its question, its health, its last word.
 import { addressOf } from '../page/address.js';
 import { h } from '../page/dom.js';
-import { breakable, chip, duration, percent, rateBar } from '../page/format.js';
-import { aged } from '../page/liveness.js';
+import { breakable, chip, percent, rateBar, since } from '../page/format.js';
 import { resumedWords } from './fleet_facts.js';
 
 /** @typedef {import('./fleet_facts.js').RobotFacts} RobotFacts */
@@ -64,9 +63,9 @@ export function fleetCard(app, facts, { chosen, mayResume, send, choose }) {
 function standingChip(app, { robot, standing, why, question }) {
   const [words, kind] = STANDINGS[standing];
   const age = standing === 'silent' ? app.liveness.robot(robot) : null;
-  const more = age !== null ? ' for ' + aged(age)
+  const more = age !== null ? [' for ', since(app.store.now() - age, app.store.now())]
     : standing === 'asked' ? ': ' + (question?.holder || question?.interface || '') : '';
-  return chip(words + more, kind, why);
+  return chip([words, more], kind, why);
 }
 
 /**
@@ -81,7 +80,7 @@ function linesOf(app, { question, questions, active, health, last, standing, why
     question && h('div', { key: 'question', class: 'row fleet-question' },
       h('a', { href: addressOf('questions', question.key) },
         question.state + ' ' + question.stands + more),
-      h('span', { class: 'dim' }, duration(now - question.asked) + ' ago'),
+      h('span', { class: 'dim' }, since(question.asked, now), ' ago'),
       h('span', { class: 'spacer' }), rateOf(question.rate)),
     standing === 'unwell' && h('p', { key: 'unwell', class: 'problem' }, why),
     active.slice(0, MOST_STATES).map(({ path, state, rate }) => h('p', { key: path + ' ' + state,
@@ -93,7 +92,7 @@ function linesOf(app, { question, questions, active, health, last, standing, why
     (health?.problems || []).map(({ part, level, message }) => h('p', { key: 'problem ' + part,
       class: 'fleet-problem ' + level }, part + ': ' + (message || level))),
     last && h('p', { key: 'last', class: 'dim fleet-last' },
-      last.words + ' · ' + duration(now - last.at) + ' ago'),
+      last.words, ' · ', since(last.at, now), ' ago'),
   ];
 }
 

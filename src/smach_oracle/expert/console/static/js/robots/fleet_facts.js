@@ -6,12 +6,14 @@ import { isOracle, listed, resumable, running, waiting } from './hand_words.js';
 /** @typedef {'waits' | 'held' | 'unwell' | 'silent' | 'asked' | 'paused' | 'runs' | 'idle'
  *   | 'gone'} Standing */
 /** @typedef {{ state: string, path: string, rate: number | null }} ActivePlace */
+/** @typedef {Pick<server.Question, 'key' | 'state' | 'stands' | 'asked' | 'rate' | 'holder'
+ *   | 'interface'>} Asked what a card says of a question: few words, to be compared soon */
 /**
  * @typedef {object} RobotFacts
  * @property {string} robot
  * @property {Standing} standing
  * @property {string} why what makes it stand so, for a title
- * @property {server.Question | undefined} question the one that has waited longest
+ * @property {Asked | undefined} question the one that has waited longest
  * @property {number} questions
  * @property {ActivePlace[]} active
  * @property {string} path of its first machine
@@ -21,6 +23,7 @@ import { isOracle, listed, resumable, running, waiting } from './hand_words.js';
  * @property {{ words: string, at: number } | null} last
  */
 
+const BY_NAME = new Intl.Collator('en', { numeric: true }); // robot_2 before robot_10
 /** @type {Standing[]} by how much a person is needed */
 const ORDER = ['waits', 'held', 'unwell', 'silent', 'asked', 'paused', 'runs', 'idle', 'gone'];
 
@@ -38,7 +41,7 @@ function needOf({ standing, health }) {
 export function byNeed(robots) {
   return [...robots].sort((one, other) => needOf(one) - needOf(other)
     || (one.question?.asked || 0) - (other.question?.asked || 0)
-    || one.robot.localeCompare(other.robot, 'en', { numeric: true }));
+    || BY_NAME.compare(one.robot, other.robot));
 }
 
 /**
@@ -68,11 +71,20 @@ export function factsOf(app, robot) {
   const waits = asked.filter(({ status, idle }) => status === 'pending' || idle > 0);
   const machines = live?.control || [];
   const { standing, why } = standingOf(app, robot, asked, waits);
-  return { robot, standing, why, question: waits[0] || asked[0], questions: asked.length,
+  const [first] = [...waits, ...asked];
+  return { robot, standing, why, question: first && shortened(first), questions: asked.length,
     active: live && live.alive ? placesOf(live).filter((each) => !isOracle(each, robot, store))
       : [], path: live?.paths[0] || '',
     holdable: Boolean(live?.control), paused: machines.filter(({ paused }) => paused),
     health: store.get('health')?.[robot], last: live?.last || null };
+}
+
+/**
+ * @param {server.Question} question
+ * @returns {Asked}
+ */
+function shortened({ key, state, stands, asked, rate, holder, interface: name }) {
+  return { key, state, stands, asked, rate, holder, interface: name };
 }
 
 /**

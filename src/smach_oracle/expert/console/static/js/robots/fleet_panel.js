@@ -144,8 +144,7 @@ class FleetPanel {
     this.cards.set(robot, card);
     const chosen = this.wanted.has(robot);
     const mayResume = this.mayResume(facts);
-    const second = Math.floor(this.app.store.now()); // it says how long ago something was
-    renderWith(card, [facts, chosen, mayResume, second], () => fleetCard(this.app, facts, {
+    renderWith(card, [facts, chosen, mayResume], () => fleetCard(this.app, facts, {
       chosen, mayResume, choose: () => this.choose(robot),
       send: (order) => {
         if (order === 'resume') this.resume([facts]);
