@@ -40,14 +40,11 @@ NO_PLACE = """return import("/static/js/robots/graph_view.js").then(({ GraphView
   return view.root.querySelectorAll(".state").length;
 })"""
 
-BARS = """return import("/static/js/questions/claim_bar.js").then(({ ClaimBar }) => {
-  const bar = new ClaimBar({ leave() {}, claim() {}, takeOver() {} });
+BARS = """return import("/static/js/questions/claim_bar.js").then(({ claimBar }) => {
+  const use = { leave() {}, claim() {}, takeOver() {} };
   const now = { holder: "ann", status: "claimed", interface: "" };
-  return [false, true].map((mayAnswer) => {
-    bar.show({ settled: false, now, mine: false, held: false, claiming: false, sending: false,
-      problem: "", mayAnswer });
-    return bar.root.textContent;
-  });
+  return [false, true].map((mayAnswer) => claimBar({ settled: false, now, mine: false, held: false,
+    claiming: false, sending: false, problem: "", mayAnswer }, use).textContent);
 })"""
 
 

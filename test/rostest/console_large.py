@@ -49,8 +49,11 @@ return Promise.all(scripts.map((name) => import("/static/js/page/" + name))).the
   const waits = root.className + " " + root.contains(b);
   b.click();
   const after = root.className + " " + root.contains(b);
+  const other = h("canvas", {});
+  for (const each of [kept, other]) render(root, h("section", {}, keep(each)));
+  const turned = root.firstElementChild === other && root.childElementCount === 1;
   root.remove();
-  return { heard: heard.join(), stays, focused, waits, after };
+  return { heard: heard.join(), stays, focused, waits, after, turned };
 })"""
 
 
@@ -209,6 +212,7 @@ class LargeMachines(ConsolePage, unittest.TestCase):
                 'focused': True,
                 'waits': 'of-2 true',
                 'after': 'of-3 false',
+                'turned': True,  # one that is kept is never made like another one
             },
         )
 

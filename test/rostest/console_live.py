@@ -52,10 +52,10 @@ KEPT = (
   replies.push({ ok: false, message: "cannot be reached" });
   said("");
   const found = [await asked(), detail.held];
-  detail.tick();
+  detail.draw();
   found.push(await asked());
   detail.claimedAt = -Infinity;
-  detail.tick();
+  detail.draw();
   found.push(await asked(), said("ann"));
   return found;"""
 )

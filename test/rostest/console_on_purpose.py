@@ -109,7 +109,7 @@ ANOTHER_BY_ACCIDENT = (
   };
   const list = ["a", "b"].map((key) => ({ ...question, key, holder: "", status: "pending" }));
   store.receive({ now: 0, sections: { questions: list } });
-  panel.update(["questions"]);
+  panel.draw(["questions"]);
   const sent = () => told.filter((name) => name !== "view").join();
   const press = (key) => panel.queue.querySelector(`[data-key=${key}]`).click();
   const typed = () => panel.stage.querySelector(".why").value;
@@ -137,22 +137,18 @@ ANOTHER_BY_ACCIDENT = (
 )
 # "No, go back" from giving up a container above that may end as the failed one may
 GO_BACK = """
-return import("/static/js/answering/give_up.js").then(({ GiveUp }) => {
-  const make = (outcome, key, words, act) => {
-    const button = document.createElement("button");
-    button.dataset.name = outcome;
-    button.onclick = act;
-    return button;
-  };
-  const part = new GiveUp({ state: "PICK", path: "TOP/FETCH", give_up: ["aborted"],
-    give_up_above: [{ container: "TOP", outcome: "aborted" }], running: false }, make,
-  { send() {}, changed() {} });
-  document.body.append(part.root);
-  part.root.querySelector(".ends-above").open = true;
-  part.ask("aborted", "TOP");
-  part.cancel();
+return import("/static/js/answering/answer_form.js").then(({ AnswerForm }) => {
+  const form = new AnswerForm({ choices: [], interfaces: [], state: "PICK", path: "TOP/FETCH",
+    outputs: [], userdata: [], supersede: [], history: [], give_up: ["aborted"],
+    give_up_above: [{ container: "TOP", outcome: "aborted" }], running: false },
+  () => {}, () => {});
+  document.body.append(form.root);
+  form.show(true, {}, 0);
+  form.root.querySelector(".ends-above").open = true;
+  form.giveUp.ask("aborted", "TOP");
+  form.cancel();
   const focused = document.activeElement.dataset.container;
-  part.root.remove();
+  form.root.remove();
   return focused;
 });"""
 # which outcome the key `s` sends, of states with these outcomes and what they mean
@@ -164,7 +160,7 @@ return import("/static/js/answering/answer_form.js").then(({ AnswerForm }) => (
       outputs: [], userdata: [], give_up: [], give_up_above: [], running: false, history: [],
       supersede: outcomes.map(([outcome, meaning]) => ({ outcome, meaning, target: "NEXT" })) },
     ({ name }) => sent.push(name), () => {});
-    form.enable(true);
+    form.show(true, {}, 0);
     form.press("s");
     return sent.join();
   })));"""
@@ -183,8 +179,8 @@ return import("/static/js/answering/follow_up.js").then(({ FollowUp }) => {
   shown.take({ trial: "t", from: 0, events });
   return ["", "gone", ""].map((now) => {
     gone = now;
-    shown.update();
-    return shown.hint.textContent;
+    shown.draw();
+    return shown.root.querySelector(".hint-of-steps").textContent;
   });
 });"""
 # how a machine stands whose state ORACLE is its oracle, by its graph or as no other state, or not

@@ -52,12 +52,12 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then(async
     connection: { connected: true, request, browser: "b1" }, liveness: new Liveness(store),
     went() {}, isMine: ({ holder, session }) => holder === "ann" && session === "b1" };
   const detail = new QuestionDetail(app, question, { leave() {}, choose() {} });
-  store.onChange((names) => detail.update(names));
+  store.onChange((names) => detail.draw(names));
   const said = (holder) => {
     const session = holder === "ann" ? "b1" : "";
     const status = holder ? "claimed" : "pending";
     store.receive({ now: 0, sections: { questions: [{ ...question, holder, session, status }] } });
-    return detail.claimBar.root.textContent;
+    return detail.root.querySelector(".claim-bar").textContent;
   };
 %s
 });"""

@@ -203,7 +203,8 @@ class Queue(ConsolePage, unittest.TestCase):
               view.choice.selectedIndex = 1;
               view.show();
               await view.sendAll();
-              done([told.join(), view.list.textContent, view.said.textContent]);
+              done([told.join(), view.root.querySelector(".alike-list").textContent,
+                view.said]);
             });"""
         )
         self.assertEqual(refused[0], 'claim,answer,release')

@@ -1,10 +1,10 @@
 // @ts-check
 // What the robot does after an answer: until its trial ends, or it asks again.
 import { wasMeant } from '../page/deliberate.js';
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { added } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { keep, render } from '../page/redraw.js';
 
 /**
  * Where one may go from a question: to the list, or to another one, by its key and whether that was
@@ -41,15 +41,8 @@ export class FollowUp {
     /** @type {HTMLElement[]} */
     this.given = []; // what this has put the focus on: it may take it on from there
     this.waits = false; // it does nothing new: the state runs on
-    this.earlier = h('p', { class: 'dim' });
-    this.steps = h('ol', { class: 'steps' });
-    this.hint = h('p', { class: 'hint-of-steps' });
     this.title = h('h3', { class: 'done', tabindex: -1 });
-    this.next = h('div', { class: 'row next-question' });
-    this.back = h('button', { 'data-action': 'back', onclick: ways.leave }, 'Back to the list');
-    this.root = h('div', { class: 'follow-up', role: 'status' }, this.title, this.earlier,
-      this.steps, this.hint, this.next,
-      h('div', { class: 'row' }, this.back));
+    this.root = h('div', { class: 'follow-up', role: 'status' });
     this.stop = app.store.onEvents((slice) => this.take(slice));
   }
 
@@ -60,11 +53,11 @@ export class FollowUp {
     this.waits = running && answer.kind === 'goto' && answer.name === state
       && !answer.container;
     this.title.className = gaveUp ? 'gave-up' : 'done';
-    setText(this.title, (gaveUp ? '■ The robot gives up, as you said: '
+    this.title.append((gaveUp ? '■ The robot gives up, as you said: '
       : '✓ The robot has your answer: ')
       + (this.waits ? 'wait on' : answerWords(answer, this.question)));
-    setText(this.hint, this.hintOf([]));
     this.since = Date.now();
+    this.draw();
     this.watch();
   }
 
@@ -83,27 +76,44 @@ export class FollowUp {
     const after = this.events.slice(answered + 1).filter((event) => SHOWN.has(event.kind));
     const end = after.findIndex((event) => this.ends(event));
     this.last = end < 0 ? null : after[end];
-    this.show(end < 0 ? after : after.slice(0, end + 1));
+    this.shown = end < 0 ? after : after.slice(0, end + 1);
+    this.draw();
   }
 
   /** @param {server.TrialEvent} event */
   ends({ kind }) { return kind === 'trial_end' || kind === 'query_opened'; }
 
-  /** @param {server.TrialEvent[]} steps */
-  show(steps) {
-    const hidden = Math.max(0, steps.length - MOST_SHOWN);
-    setText(this.earlier, hidden ? hidden + ' earlier steps are left out.' : '');
-    this.earlier.hidden = !hidden;
-    redraw(this.steps, steps.slice(hidden).map((event) => h('li', { class: event.kind },
-      event.words || event.kind, h('span', { class: 'dim' }, added(event)))));
-    this.shown = steps;
-    setText(this.hint, this.hintOf(steps));
-    this.root.classList.toggle('over', Boolean(this.last));
-    this.showNext();
+  draw() {
+    if (!this.since) return;
+    const next = this.nextQuestion();
+    const before = this.root.querySelector('.next-question');
+    const free = focusIsFree(this.title, ...(before ? [before] : []), ...this.given);
+    render(this.root, this.view(next));
+    if (free && this.last && this.app.current === 'questions') this.focusNext();
   }
 
-  /** @param {server.TrialEvent[]} steps */
-  hintOf(steps) {
+  /** @param {server.Question | undefined} next */
+  view(next) {
+    const { shown, last, ways } = this;
+    const hidden = Math.max(0, shown.length - MOST_SHOWN);
+    return h('div', { class: 'follow-up' + (last ? ' over' : ''), role: 'status' },
+      keep(this.title), h('p', { class: 'dim', hidden: !hidden },
+        hidden + ' earlier steps are left out.'),
+      h('ol', { class: 'steps' }, shown.slice(hidden).map((event) => h('li',
+        { class: event.kind }, event.words || event.kind,
+        h('span', { class: 'dim' }, added(event))))),
+      h('p', { class: 'hint-of-steps' }, this.hint),
+      h('div', { class: 'row next-question', hidden: !next }, next && h('button', {
+        class: 'primary', key: next.key, 'data-action': 'next-question',
+        'data-deliberate': 'open ' + next.key,
+        onclick: (/** @type {Event} */ event) => ways.choose(next.key, wasMeant(event)) },
+      'Next question: ' + next.state + ' of ' + next.robot)),
+      h('div', { class: 'row' }, h('button', { 'data-action': 'back', onclick: ways.leave },
+        'Back to the list')));
+  }
+
+  get hint() {
+    const { shown: steps } = this;
     const gone = this.last ? '' : this.app.liveness.gone(this.question);
     if (gone) return gone;
     if (!this.last && steps.length) {
@@ -134,30 +144,13 @@ export class FollowUp {
     return again || questions.find(({ status }) => status === 'pending');
   }
 
-  showNext() {
-    const next = this.nextQuestion();
-    const free = focusIsFree(this.title, this.next, ...this.given);
-    this.next.hidden = !next;
-    redraw(this.next, next && h('button', { class: 'primary', key: next.key,
-      'data-action': 'next-question', 'data-deliberate': 'open ' + next.key,
-      onclick: (/** @type {Event} */ event) => this.ways.choose(next.key, wasMeant(event)) },
-    'Next question: ' + next.state + ' of ' + next.robot));
-    if (free && this.last && this.app.current === 'questions') this.focusNext();
-  }
-
   /** What the robot did is over: the next thing to do is the next question, or to go back. */
   focusNext() {
-    const wanted = this.next.querySelector('button') || this.back;
+    const wanted = this.root.querySelector('.next-question button, [data-action=back]');
     const shown = this.root.isConnected && !document.querySelector('dialog[open]');
-    if (!shown || document.activeElement === wanted) return;
+    if (!(wanted instanceof HTMLElement) || !shown || document.activeElement === wanted) return;
     this.given = [wanted];
     moveFocus(wanted);
-  }
-
-  update() {
-    if (!this.since) return;
-    this.showNext();
-    setText(this.hint, this.hintOf(this.shown));
   }
 }
 

@@ -1,9 +1,9 @@
 // @ts-check
 // The preconditions of a state, in the order in which they run, and whether each holds now.
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { duration } from '../page/format.js';
 
-/** @typedef {{ [part in 'root' | 'sign' | 'word' | 'why']: HTMLElement }} Item */
+/** @typedef {server.PreconditionStatus[] | undefined} Statuses in the order of the names */
 
 const STALE_S = 8;
 const HOLDS = { sign: '✓', word: 'holds', kind: 'good' };
@@ -29,54 +29,37 @@ function reasonOf(status) {
   return ': ' + rest.replace('running ' + name + ' ', 'running it ');
 }
 
-export class PreconditionList {
-  /** @param {string[]} names */
-  constructor(names) {
-    this.items = names.map(itemOf);
-    this.age = h('span', { class: 'dim age' });
-    // a line each from the first: what is below stays where it is
-    this.root = h('span', { class: 'preconditions' }, 'preconditions', this.age,
-      this.items.map((item) => item.root));
-  }
+/**
+ * Since when the oldest of them is known, in words; '' where none is.
+ * @param {Statuses} statuses
+ * @param {number} now by the server's clock
+ */
+export function ageWords(statuses, now) {
+  const age = now - oldest(statuses);
+  return age < 1 ? 'as of now' : age < Infinity ? 'as of ' + duration(age) + ' ago' : '';
+}
 
-  /**
-   * Only their names where the robot publishes nothing.
-   * @param {server.PreconditionStatus[] | undefined} statuses in the same order
-   * @param {number} now by the server's clock
-   */
-  show(statuses, now) {
-    const checked = (statuses || []).map((status) => status.checked ?? Infinity);
-    const oldest = Math.min(...checked);
-    const age = now - oldest;
-    const stale = age > STALE_S ? ' stale' : '';
-    this.items.forEach((item, index) => showStatus(item, statuses && statuses[index], stale));
-    const when = age < 1 ? 'as of now' : 'as of ' + duration(age) + ' ago';
-    setText(this.age, oldest < Infinity ? when : '');
-  }
+/** @param {Statuses} statuses */
+function oldest(statuses) {
+  const times = (statuses || []).flatMap(({ checked }) => checked ?? []);
+  return times.length ? Math.min(...times) : -Infinity;
 }
 
 /**
- * @param {string} name
- * @returns {Item}
+ * A line each from the first: what is below stays where it is. Only their names where the robot
+ * publishes nothing.
+ * @param {string[]} names
+ * @param {Statuses} statuses
+ * @param {number} now by the server's clock
  */
-function itemOf(name) {
-  const sign = h('span', { class: 'sign', 'aria-hidden': 'true' });
-  const word = h('span', { class: 'word' });
-  const why = h('span', { class: 'why' });
-  const root = h('span', { class: 'precondition' }, sign, h('span', {}, name), ' ', word, why);
-  return { root, sign, word, why };
-}
-
-/**
- * @param {Item} item
- * @param {server.PreconditionStatus | undefined} status
- * @param {string} stale a class
- */
-function showStatus(item, status, stale) {
-  const { sign, word, kind } = wordsOf(status);
-  setText(item.sign, sign);
-  setText(item.word, word);
-  const shown = 'precondition ' + kind + stale;
-  if (item.root.className !== shown) item.root.className = shown;
-  setText(item.why, reasonOf(status));
+export function preconditionList(names, statuses, now) {
+  const stale = now - oldest(statuses) > STALE_S ? ' stale' : '';
+  return h('span', { class: 'preconditions' }, 'preconditions',
+    h('span', { class: 'dim age' }, ageWords(statuses, now)), names.map((name, index) => {
+      const status = statuses?.[index];
+      const { sign, word, kind } = wordsOf(status);
+      return h('span', { class: 'precondition ' + kind + stale },
+        h('span', { class: 'sign', 'aria-hidden': 'true' }, sign), h('span', {}, name), ' ',
+        h('span', { class: 'word' }, word), h('span', { class: 'why' }, reasonOf(status)));
+    }));
 }

@@ -1,6 +1,6 @@
 // @ts-check
 // A scene in 3D to be turned round: layers on a canvas.
-import { h, setText } from '../page/dom.js';
+import { h, say } from '../page/dom.js';
 import { Orbit } from './orbit.js';
 import { Raster } from './raster.js';
 import { boxAround, diagonalOf, middleOf } from './transforms.js';
@@ -37,8 +37,7 @@ export class SceneView {
 
   /** @param {string} text */
   say(text) {
-    setText(this.note, text);
-    this.note.hidden = !text;
+    say(this.note, text);
   }
 
   /** @param {(drawing.Layer | null | undefined | false)[]} layers */

@@ -2,7 +2,7 @@
 // What is seen beside the controls of a hand: cameras side by side, and the robot in 3D. The
 // likeliest of the robot's own cameras is there from the beginning. Views of others are shown to
 // who chooses them, and never remembered.
-import { h, replace } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { breakable } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
@@ -33,15 +33,10 @@ export class DriveViews {
     /** @type {server.Sensor[]} */
     this.others = []; // cameras that are not known as its own
     this.chosen = remembered(PREFERENCE, '').split('\n').filter(Boolean); // topics
-    this.key = ''; // of what there is and of what is chosen
     /** @type {Map<string, View>} */
     this.views = new Map(); // by topic
-    this.choices = h('div', { class: 'row wrap', role: 'group', 'aria-label': 'Views' });
-    this.more = h('select', { 'aria-label': OTHERS, onchange: () => this.turn(this.more.value) });
-    this.foreign = h('p', { class: 'warn-note', hidden: true });
     this.stage = h('div', { class: 'drive-stage' });
-    this.root = h('div', { class: 'drive-views' },
-      h('div', { class: 'row wrap' }, this.choices, this.more), this.foreign, this.stage);
+    this.root = h('div', { class: 'drive-views' });
   }
 
   stop() { for (const view of this.views.values()) view.stop(); }
@@ -80,20 +75,20 @@ export class DriveViews {
   }
 
   show() {
-    const { looked, others } = this;
-    const key = JSON.stringify([this.own, others, looked]);
-    if (key === this.key) return;
-    this.key = key;
+    const { looked, own, others } = this;
     const topics = looked.map((each) => each.topic);
-    redraw(this.choices, this.own.length
-      ? this.own.map((each) => this.button(each, topics.includes(each.topic)))
-      : h('span', { class: 'dim' }, NONE));
-    replace(this.more, h('option', { value: '' }, OTHERS), others.map(({ topic }) => (
-      h('option', { value: topic }, (topics.includes(topic) ? 'Close ' : '') + topic))));
-    this.more.hidden = !others.length;
     const foreign = others.map((each) => each.topic).filter((each) => topics.includes(each));
-    replace(this.foreign, NOT_ITS_OWN + foreign.join(', '));
-    this.foreign.hidden = !foreign.length;
+    redraw(this.root, h('div', { class: 'row wrap' },
+      h('div', { class: 'row wrap', role: 'group', 'aria-label': 'Views' }, own.length
+        ? own.map((each) => this.button(each, topics.includes(each.topic)))
+        : h('span', { class: 'dim' }, NONE)),
+      h('select', { 'aria-label': OTHERS, hidden: !others.length, onchange: ({ target }) => {
+        if (target instanceof HTMLSelectElement) this.turn(target.value);
+      } }, h('option', { value: '', selected: true }, OTHERS), others.map(({ topic }) => (
+        h('option', { key: topic, value: topic },
+          (topics.includes(topic) ? 'Close ' : '') + topic))))),
+    h('p', { class: 'warn-note', hidden: !foreign.length }, NOT_ITS_OWN + foreign.join(', ')),
+    this.stage);
     this.open(looked);
   }
 

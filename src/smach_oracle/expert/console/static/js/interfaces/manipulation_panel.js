@@ -10,6 +10,7 @@ import { DriveInput } from './drive_input.js';
 import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
 import { DriveViews } from './drive_views.js';
 import { factsOf, lightOf } from './hand_state.js';
+import { factRows } from './marked_facts.js';
 
 /** @typedef {import('./drive_moves.js').Move} Move */
 /** @typedef {import('./drive_moves.js').MoveKind} MoveKind */
@@ -51,8 +52,9 @@ export class ManipulationPanel {
     this.stopButton = h('button', { class: 'stop', 'data-action': 'stop-hand',
       onclick: () => this.stopHand() }, '■ Stop the hand');
     this.problem = h('p', { class: 'problem', role: 'alert' });
-    this.frames = { tool: this.frameButton('tool'), base: this.frameButton('base'),
-      camera: this.frameButton('camera') };
+    this.frames = h('div', { class: 'row wrap' });
+    /** @type {server.DriveFrame} */
+    this.frame = frameOf(remembered('drive frame', 'tool'));
     this.scale = h('input', { type: 'range', min: 5, max: 100, step: 5,
       value: remembered('drive speed', '30'), oninput: () => this.showScale(),
       'aria-label': 'Speed, % of the interface\'s own limit' });
@@ -65,7 +67,6 @@ export class ManipulationPanel {
     this.hint = h('p', { class: 'dim hint' });
     this.root = this.build();
     this.showScale();
-    this.frame = this.choose(frameOf(remembered('drive frame', 'tool')));
     this.showHeld(this.input.read());
     this.timer = setInterval(() => this.beat(), PERIOD_MS);
     this.update();
@@ -84,10 +85,7 @@ export class ManipulationPanel {
 
   buildControls() {
     return h('div', { class: 'manipulation-controls' },
-      h('div', { class: 'manipulation-choices' }, this.arms,
-        h('div', { class: 'row wrap' },
-          h('span', { class: 'dim frame-words' }, 'Along the axes of the'),
-          Object.values(this.frames))),
+      h('div', { class: 'manipulation-choices' }, this.arms, this.frames),
       h('label', { class: 'row' },
         h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
       h('h4', {}, TITLES.linear), this.padGroup('linear'),
@@ -102,13 +100,6 @@ export class ManipulationPanel {
   padGroup(kind) {
     return h('div', { class: 'pads', role: 'group', 'aria-label': TITLES[kind] },
       MOTIONS.filter((motion) => motion.kind === kind).map(({ move }) => this.pads.get(move)));
-  }
-
-  /** @param {server.DriveFrame} name */
-  frameButton(name) {
-    return h('button', { class: 'tool', 'data-frame': name,
-      onclick: () => { remember('drive frame', name); this.frame = this.choose(name); } },
-      FRAMES[name]);
   }
 
   /** @param {Move} move */
@@ -159,16 +150,25 @@ export class ManipulationPanel {
     if (!ok) setText(this.problem, message);
   }
 
-  /**
-   * @param {server.DriveFrame} frame along whose axes the hand moves
-   * @returns {server.DriveFrame}
-   */
+  /** @param {server.DriveFrame} frame along whose axes the hand moves */
   choose(frame) {
     this.input.releaseAll();
-    for (const button of Object.values(this.frames)) {
-      button.setAttribute('aria-pressed', String(button === this.frames[frame]));
+    remember('drive frame', frame);
+    this.frame = frame;
+    this.update();
+  }
+
+  /** @param {server.DriveFrame[]} frames that the interface knows */
+  showFrames(frames) {
+    if (frames.length && !frames.includes(this.frame)) {
+      this.input.releaseAll();
+      this.frame = frames[0];
+      this.input.unsettle(); // the person has not chosen it
     }
-    return frame;
+    redraw(this.frames, h('span', { class: 'dim frame-words' }, 'Along the axes of the'),
+      frames.map((frame) => h('button', { key: frame, class: 'tool', 'data-frame': frame,
+        'aria-pressed': frame === this.frame, onclick: () => this.choose(frame) },
+      FRAMES[frame])));
   }
 
   /** @param {string} arm */
@@ -242,19 +242,13 @@ export class ManipulationPanel {
     this.showWheel(now);
     this.root.classList.toggle('mine', mine);
     for (const button of this.pads.values()) button.disabled = !mine;
-    for (const name of /** @type {server.DriveFrame[]} */ (Object.keys(this.frames))) {
-      this.frames[name].hidden = !frames.includes(name);
-    }
-    if (frames.length && !frames.includes(this.frame)) {
-      this.frame = this.choose(frames[0]);
-      this.input.unsettle(); // the person has not chosen it
-    }
+    this.showFrames(frames);
     this.showArms(now || UNKNOWN);
     const { text, kind, share } = lightOf(state);
     setText(this.light, text);
     this.light.dataset['kind'] = kind;
     this.light.style.setProperty('--share', String(share));
-    this.showFacts(now && state ? factsOf(now, state) : []);
+    redraw(this.facts, factRows(now && state ? factsOf(now, state) : []));
     this.views.update();
   }
 
@@ -272,11 +266,5 @@ export class ManipulationPanel {
     const driver = now && now.driver ? now.driver + ' drives.' : nobody;
     const shown = this.mine ? 'You drive.' : driver;
     setText(this.driver, connected ? shown : 'No connection: the hand stands.');
-  }
-
-  /** @param {[name: string, value: string][]} facts */
-  showFacts(facts) {
-    redraw(this.facts, facts.map(([name, value]) => [h('dt', {}, name),
-      h('dd', { class: 'number', 'data-fact': name.toLowerCase() }, value)]));
   }
 }

@@ -1,8 +1,8 @@
 // @ts-check
 // Marking an object in the very image of the failure: draw around it, refine, accept; the machine
 // goes on.
-import { h, setText } from '../page/dom.js';
-import { redrawWith } from '../page/redraw.js';
+import { h, say, setText } from '../page/dom.js';
+import { keep, render } from '../page/redraw.js';
 import { drawImage } from '../sensors/image_canvas.js';
 import { SensorFeed } from '../sensors/sensor_feed.js';
 import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
@@ -49,16 +49,13 @@ export class PerceptionPanel {
       'aria-label': 'The image to draw on' });
     this.canvas = this.makeCanvas();
     this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the image…');
-    /** @type {Map<Tool, HTMLButtonElement>} */
-    this.tools = new Map(TOOLS.map(({ tool, text, title }) => [tool, h('button', { class: 'tool',
-      'data-tool': tool, title, onclick: () => this.take(tool) }, text)]));
-    this.result = h('div', { class: 'marked', role: 'status' });
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outcome = outcomeChoice(question);
-    this.buttons = this.makeButtons();
+    this.outcomeRow = outcomeRow(this.outcome);
+    this.head = h('div', {});
+    this.side = h('div', {});
     this.object = new ObjectView(app, () => this.sensors);
     this.root = this.build();
-    this.take('rectangle');
     /** @type {SensorFeed<server.ImageFacts>} */
     this.feed = new SensorFeed(app, () => this.sensors.image, this.root,
       { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
@@ -76,38 +73,39 @@ export class PerceptionPanel {
     });
   }
 
-  makeButtons() {
-    return {
-      undo: button('Undo', () => this.undo()),
-      clear: button('Clear', () => this.clear()),
-      failed: button('Image of the failure', () => this.useFrame('at_goal')),
-      fresh: button('New image', () => this.useFrame('fresh')),
-      accept: button('Accept the object', () => this.accept(), 'primary accept', 'accept'),
-      quit: button('Give up', () => this.giveUp(), 'quit', 'give up'),
-    };
-  }
-
   build() {
-    const { failed, fresh } = this.buttons;
-    return h('section', { class: 'card perception', 'aria-label': 'Mark the object' },
-      h('div', { class: 'perception-head' },
-        h('h3', {}, 'Mark the object for ', this.question.state),
-        h('span', { class: 'spacer' }), failed, fresh),
+    return h('section', { class: 'card perception', 'aria-label': 'Mark the object' }, this.head,
       h('div', { class: 'perception-body' },
-        h('div', { class: 'screen' }, this.image, this.canvas.root, this.canvas.hint,
-          this.note), this.object.root,
-        h('div', { class: 'perception-side' }, this.buildSide())));
+        h('div', { class: 'screen' }, this.image, this.canvas.root, this.canvas.hint, this.note),
+        this.object.root, this.side));
   }
 
-  /** @returns {page.Child} */
-  buildSide() {
-    const { undo, clear, accept, quit } = this.buttons;
-    const several = this.question.supersede.length > 1;
-    const tools = { class: 'tool-row', role: 'toolbar', 'aria-label': 'Tools' };
-    return [h('div', tools, [...this.tools.values()]),
-      h('div', { class: 'tool-row' }, undo, clear), this.result, this.problem,
+  headView() {
+    const off = { disabled: !this.may || this.busy };
+    return h('div', { class: 'perception-head' },
+      h('h3', {}, 'Mark the object for ', this.question.state), h('span', { class: 'spacer' }),
+      button('Image of the failure', () => this.useFrame('at_goal'), off),
+      button('New image', () => this.useFrame('fresh'), off));
+  }
+
+  sideView() {
+    const off = !this.may || this.busy;
+    const drawn = Boolean(this.marking.region);
+    return h('div', { class: 'perception-side' },
+      h('div', { class: 'tool-row', role: 'toolbar', 'aria-label': 'Tools' },
+        TOOLS.map(({ tool, text, title }) => button(text, () => this.take(tool), { title,
+          'data-tool': tool, disabled: off, 'aria-pressed': tool === this.canvas.tool }))),
+      h('div', { class: 'tool-row' },
+        button('Undo', () => this.undo(), { disabled: off || !drawn }),
+        button('Clear', () => this.clear(), { disabled: off || !drawn })),
+      h('div', { class: 'marked', role: 'status' }, this.resultOf(drawn)), keep(this.problem),
       h('span', { class: 'spacer' }),
-      h('div', { class: 'perception-end' }, several && outcomeRow(this.outcome), accept, quit)];
+      h('div', { class: 'perception-end' },
+        this.question.supersede.length > 1 && keep(this.outcomeRow),
+        button('Accept the object', () => this.accept(), { class: 'primary accept',
+          disabled: off || !this.marked || this.cutting, 'data-deliberate': 'accept' }),
+        button('Give up', () => this.giveUp(), { class: 'quit', disabled: off,
+          'data-deliberate': 'give up' })));
   }
 
   stop() {
@@ -128,9 +126,7 @@ export class PerceptionPanel {
   /** @param {Tool} tool */
   take(tool) {
     this.canvas.tool = tool;
-    for (const [name, each] of this.tools) {
-      each.setAttribute('aria-pressed', String(name === tool));
-    }
+    this.refresh();
   }
 
   /**
@@ -139,8 +135,7 @@ export class PerceptionPanel {
    */
   say(text, missing) {
     if (missing === 'next') return; // one image is all there is to come
-    setText(this.note, this.stamp ? '' : text);
-    this.note.hidden = !this.note.textContent;
+    say(this.note, this.stamp ? '' : text);
   }
 
   /**
@@ -255,22 +250,19 @@ export class PerceptionPanel {
   ask(command, args) { return replyTo(this.app, this.problem, command, args); }
 
   refresh() {
-    const { may, busy } = this;
-    const { undo, clear, failed, fresh, accept, quit } = this.buttons;
     this.canvas.paint();
-    for (const each of [...this.tools.values(), failed, fresh, quit]) each.disabled = !may || busy;
-    undo.disabled = clear.disabled = !may || !this.marking.region || busy;
-    accept.disabled = !may || !this.marked || busy || this.cutting;
-    this.showResult();
+    render(this.head, this.headView());
+    render(this.side, this.sideView());
   }
 
-  showResult() {
-    const { marked, warning, cutting } = this;
-    const drawn = Boolean(this.marking.region);
-    redrawWith(this.result, [marked, drawn, cutting, warning, this.may], () => (
-      marked && marked.object ? [markedFacts(marked.object, marked.elapsed),
-        warning && h('p', { class: 'dim' }, warning)]
-        : h('p', { class: 'dim' }, this.hint(drawn))));
+  /**
+   * @param {boolean} drawn
+   * @returns {page.Child}
+   */
+  resultOf(drawn) {
+    const { marked, warning } = this;
+    return marked && marked.object ? [markedFacts(marked.object, marked.elapsed),
+      warning && h('p', { class: 'dim' }, warning)] : h('p', { class: 'dim' }, this.hint(drawn));
   }
 
   /** @param {boolean} drawn */
@@ -284,9 +276,8 @@ export class PerceptionPanel {
 /**
  * @param {string} text
  * @param {() => void} onclick
- * @param {string} [kind]
- * @param {string} [deliberate] what it starts or ends
+ * @param {page.Properties} properties
  */
-function button(text, onclick, kind = 'tool', deliberate) {
-  return h('button', { class: kind, 'data-deliberate': deliberate, onclick }, text);
+function button(text, onclick, properties) {
+  return h('button', { key: text, class: 'tool', onclick, ...properties }, text);
 }

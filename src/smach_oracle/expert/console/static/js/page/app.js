@@ -117,7 +117,7 @@ export class App {
     const main = part('main');
     if (main.firstElementChild !== shown.view.root) replace(main, shown.view.root);
     this.looking.tell();
-    shown.view.draw?.();
+    shown.view.draw();
     shown.view.shown?.();
   }
 
@@ -146,9 +146,8 @@ export class App {
   update(names) {
     if (names.includes('questions')) this.alerts.look(this.store.questions, this.store.now());
     for (const { id, view, badge } of this.tabs) {
-      const { sections } = view;
-      if (id === this.current && names.some((name) => sections?.test(name))) view.draw?.();
-      view.update?.(names);
+      const wanted = id === this.current || view.always;
+      if (wanted && names.some((name) => view.sections.test(name))) view.draw(names);
       const count = view.badge ? view.badge() : 0;
       badge.hidden = !count;
       setText(badge, count);
@@ -164,8 +163,7 @@ export class App {
     for (const shown of part('main').querySelectorAll('[data-since]')) {
       setText(shown, duration(this.store.now() - Number(shown.getAttribute('data-since'))));
     }
-    this.tabNow.view.draw?.();
-    this.tabNow.view.tick?.();
+    this.tabNow.view.draw();
   }
 
   /** Whether what is shown is live: said in the top bar; the styles grey what is not. */

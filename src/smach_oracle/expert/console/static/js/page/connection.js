@@ -1,7 +1,6 @@
 // @ts-check
 // The connection to the server: it comes back by itself.
 
-/** @typedef {import('./store.js').Store} Store */
 /** @typedef {'connecting' | 'signed-out' | 'connected' | 'lost'} State */
 /**
  * @typedef {object} Waiting
@@ -32,7 +31,7 @@ export function unlessLost(err) {
 
 export class Connection {
   /**
-   * @param {Store} store
+   * @param {page.Store} store
    * @param {(state: State) => void} onState
    * @param {() => void} onEnd the person has signed out on another page of this browser
    * @param {(name: keyof server.Commands, limit: number) => void} onNoReply to a command within

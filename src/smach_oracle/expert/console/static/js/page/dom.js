@@ -144,15 +144,6 @@ export function say(element, words) {
 }
 
 /**
- * Options of a select.
- * @param {string[]} values
- * @param {string} chosen
- */
-export function options(values, chosen) {
-  return values.map((value) => h('option', { value, selected: value === chosen }, value));
-}
-
-/**
  * An element of index.html.
  * @param {string} id
  */

@@ -2,7 +2,6 @@
 // What is asked before a command is sent: whether an answer still fits what is heard, and who gives
 // it. What stops or lets go passes at once.
 
-/** @typedef {import('./liveness.js').Liveness} Liveness */
 /** @typedef {keyof server.Commands} Name */
 
 /** @type {Set<Name>} */
@@ -19,7 +18,7 @@ const NO_NAME = 'Not done: your name is needed for it.';
 
 export class Gate {
   /**
-   * @param {Liveness} liveness
+   * @param {page.Liveness} liveness
    * @param {() => boolean} named whether the server knows who uses this page
    * @param {() => Promise<boolean>} askName whether a name was given
    */

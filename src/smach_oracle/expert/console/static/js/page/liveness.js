@@ -3,13 +3,12 @@
 // answer. The console sends a beat every second; the ages that come with it grow until the next.
 import { duration } from './format.js';
 
-/** @typedef {import('./store.js').Store} Store */
 /** @typedef {'' | 'console' | 'master'} Silent */
 
 const SILENT_AFTER_S = 6; // the console has the same limit (last_heard.py)
 
 export class Liveness {
-  /** @param {Store} store */
+  /** @param {page.Store} store */
   constructor(store) {
     this.store = store;
     this.running = performance.now(); // of the last beat, by both clocks

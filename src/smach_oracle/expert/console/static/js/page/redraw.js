@@ -11,6 +11,8 @@ const KEPT = new Set(['open', 'data-settled']);
 const drawn = new WeakMap(); // of what
 /** @type {WeakMap<Node, HTMLElement>} */
 const kept = new WeakMap(); // by what stands for it in a view
+/** @type {WeakSet<Node>} */
+const own = new WeakSet(); // those that are kept: no other one becomes like them, nor they like it
 /** @type {Map<Element, () => void>} */
 const waiting = new Map(); // by element, its newest change
 /** @type {Element | null} */
@@ -35,6 +37,7 @@ export function arrange(element, ...children) {
 export function keep(element) {
   const place = document.createElement('template');
   kept.set(place, element);
+  own.add(element);
   return place;
 }
 
@@ -58,13 +61,13 @@ export function redraw(element, ...children) {
     /** @type {Map<string, ChildNode[]>} */
     const before = new Map();
     for (const node of element.childNodes) {
-      if (stay.has(node)) continue;
+      if (stay.has(node) || own.has(node)) continue;
       const same = before.get(nameOf(node));
       if (same) same.push(node);
       else before.set(nameOf(node), [node]);
     }
     put(element, nodes.map((node) => {
-      if (node.parentNode === element) return node;
+      if (node.parentNode === element || own.has(node)) return node;
       const old = (before.get(nameOf(node)) || []).shift();
       return old ? alike(old, node) : fillPlaces(node);
     }));
@@ -176,6 +179,8 @@ function copyAttributes(from, to) {
   if (from instanceof HTMLInputElement && to instanceof HTMLInputElement) {
     to.checked = from.checked; // the attribute says how it was at first
   }
+  const chosen = from.hasAttribute('selected') && to instanceof HTMLOptionElement;
+  if (chosen && !to.selected) to.selected = true;
 }
 
 /**

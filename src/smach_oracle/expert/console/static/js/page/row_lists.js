@@ -2,7 +2,6 @@
 // Long lists, of which the server sends what has changed to pages that look at them.
 import { unlessLost } from './connection.js';
 
-/** @typedef {import('./connection.js').Connection} Connection */
 /** @typedef {'trials' | 'people' | ''} Place what lists belong to */
 
 /**
@@ -29,7 +28,7 @@ export function changed(old, { all, rows, gone = [] }) {
 /** Tells the server which lists are looked at. */
 export class Looking {
   /**
-   * @param {Connection} connection
+   * @param {page.Connection} connection
    * @param {() => Place} wanted where what is shown has lists
    */
   constructor(connection, wanted) {

@@ -3,8 +3,6 @@
 import { h, part, replace, setText } from './dom.js';
 import { remember } from './preferences.js';
 
-/** @typedef {import('./connection.js').Connection} Connection */
-
 /** @type {{ [status: number]: string | undefined }} */
 const WORDS = { 0: 'The console does not answer.', 200: '', 401: 'There is no such token.',
   429: 'Too many tries; wait a little.' };
@@ -14,7 +12,7 @@ const ABOUT_NAMES = 'Your name, as robots, other experts and the records of tria
 
 /**
  * Put the form that takes a token in the place of the panels.
- * @param {Connection} connection
+ * @param {page.Connection} connection
  * @param {string | null} note what the page says of itself
  */
 export function askToken(connection, note) {
@@ -36,7 +34,7 @@ export function askToken(connection, note) {
 }
 
 /**
- * @param {Connection} connection
+ * @param {page.Connection} connection
  * @param {() => void} signOut
  */
 export function askName(connection, signOut) {
@@ -69,7 +67,7 @@ let demanded = null;
 /**
  * Ask for the name that something needs which is to be done. It covers nothing up: a hand can be
  * stopped meanwhile.
- * @param {Connection} connection
+ * @param {page.Connection} connection
  * @returns {Promise<boolean>} whether it was given
  */
 export function demandName(connection) {
@@ -79,7 +77,7 @@ export function demandName(connection) {
 }
 
 /**
- * @param {Connection} connection
+ * @param {page.Connection} connection
  * @param {(given: boolean) => void} done
  */
 function showDemand(connection, done) {
@@ -118,7 +116,7 @@ function showDemand(connection, done) {
 }
 
 /**
- * @param {Connection} connection
+ * @param {page.Connection} connection
  * @param {string} name
  */
 function rename(connection, name) {

@@ -5,6 +5,7 @@ import { Store } from './store.js';
 import { Question, Role } from '../server';
 
 export as namespace page;
+export { Connection, Liveness, Store };
 
 declare global {
   interface Navigator { // of browsers of 2023 and later
@@ -57,15 +58,16 @@ export interface Panel {
 export interface PanelView {
   readonly root: HTMLElement;
   /** The sections that it is drawn of: it is drawn as they change, while it is shown. */
-  readonly sections?: RegExp;
-  /** It becomes a view of what there is now: as it comes, and every second while it is shown. */
-  draw?(): void;
-  /** Sections have changed, of which it notes something also while another panel is shown. */
-  update?(names: string[]): void;
+  readonly sections: RegExp;
+  /** Whether it is also drawn as they change while another panel is shown. */
+  readonly always?: boolean;
+  /**
+   * It becomes a view of what there is now: as it comes, every second while it is shown, and as
+   * sections of these names change.
+   */
+  draw(names?: string[]): void;
   /** It is shown now. */
   shown?(): void;
-  /** A second has passed while it is shown. */
-  tick?(): void;
   /** The connection is there, again. */
   connected?(): void;
   /** What it shows, for the address; '' for what it opens with. */

@@ -2,9 +2,9 @@
 // The same answer for several like questions. Each is checked, claimed and answered by itself:
 // where the answer is not offered it is not sent, and that is said.
 import { NoReply, unlessLost } from '../page/connection.js';
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { breakable, counted, duration, percent, robotMark } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { keep, render } from '../page/redraw.js';
 
 /** @typedef {{ ok: boolean, words: string }} Check */
 /** @typedef {{ answer: server.Answer, words: string, offered: number, advised: number }} Offer */
@@ -30,7 +30,7 @@ export class AlikeAnswer {
     /** @type {Map<string, Check>} */
     this.results = new Map(); // by key, of those that were sent
     this.sending = false;
-    const [{ state, path, what }] = questions;
+    const [{ state, what }] = questions;
     this.offers = offersOf(questions);
     this.title = h('h2', { tabindex: -1 }, breakable(state, '_'), ' ', what, ': the same answer');
     this.choice = h('select', { id: 'alike-answer', onchange: () => this.show() },
@@ -39,19 +39,8 @@ export class AlikeAnswer {
         words + ' (offered by ' + offered + (advised ? ', recommended by ' + advised : '') + ')')));
     this.why = h('input', { type: 'text', maxlength: 2000, placeholder: 'Reason (optional)',
       'aria-label': 'Reason, for the record' });
-    this.list = h('div', { class: 'alike-list' });
-    this.send = h('button', { class: 'primary', 'data-action': 'send-alike',
-      onclick: () => this.sendAll() });
-    this.said = h('p', { class: 'dim', role: 'status' });
-    this.root = h('article', { class: 'detail alike' },
-      h('header', { class: 'detail-head' }, h('button', { class: 'back',
-        'aria-label': 'Back to the list', onclick: leave }, '‹'),
-      h('div', {}, this.title, h('p', { class: 'dim' },
-        counted(questions.length, 'question'), ' · ', breakable(path, '/')))),
-      h('section', { class: 'card' }, h('label', { for: 'alike-answer' }, 'The answer'),
-        this.choice, this.why, this.list, this.said,
-        h('div', { class: 'row' }, this.send,
-          h('button', { 'data-action': 'leave-alike', onclick: leave }, 'Back to the list'))));
+    this.said = ''; // to how many it was sent
+    this.root = h('article', {});
     this.show();
   }
 
@@ -86,12 +75,27 @@ export class AlikeAnswer {
   }
 
   show() {
-    const { answer, ready } = this;
-    redraw(this.list, this.questions.map((question) => this.row(question, answer)));
-    setText(this.send, this.sending ? 'Sending…' : 'Send to ' + ready.length);
-    this.send.dataset['deliberate'] = 'alike ' + ready.length + ' ' + this.choice.value;
-    this.send.disabled = this.sending || !ready.length || !this.app.mayAnswer;
     this.choice.disabled = this.sending;
+    render(this.root, this.view());
+  }
+
+  view() {
+    const { answer, ready, questions, leave, sending } = this;
+    const count = ready.length;
+    return h('article', { class: 'detail alike' },
+      h('header', { class: 'detail-head' }, h('button', { class: 'back',
+        'aria-label': 'Back to the list', onclick: leave }, '‹'),
+      h('div', {}, keep(this.title), h('p', { class: 'dim' },
+        counted(questions.length, 'question'), ' · ', breakable(questions[0].path, '/')))),
+      h('section', { class: 'card' }, h('label', { for: 'alike-answer' }, 'The answer'),
+        keep(this.choice), keep(this.why),
+        h('div', { class: 'alike-list' }, questions.map((each) => this.row(each, answer))),
+        h('p', { class: 'dim', role: 'status' }, this.said),
+        h('div', { class: 'row' }, h('button', { class: 'primary', 'data-action': 'send-alike',
+          disabled: sending || !count || !this.app.mayAnswer,
+          'data-deliberate': 'alike ' + count + ' ' + this.choice.value,
+          onclick: () => this.sendAll() }, sending ? 'Sending…' : 'Send to ' + count),
+        h('button', { 'data-action': 'leave-alike', onclick: leave }, 'Back to the list'))));
   }
 
   /**
@@ -130,7 +134,7 @@ export class AlikeAnswer {
     }
     this.sending = false;
     const sent = ready.filter(({ key }) => this.results.get(key)?.ok).length;
-    setText(this.said, 'Sent to ' + sent + ' of ' + ready.length + '.');
+    this.said = 'Sent to ' + sent + ' of ' + ready.length + '.';
     this.show();
   }
 
@@ -162,13 +166,11 @@ export class AlikeAnswer {
 
   connected() {}
 
-  shown() { this.show(); }
+  shown() {}
 
-  tick() { this.show(); }
-
-  /** @param {string[]} names of sections */
-  update(names) {
-    if (names.includes('questions') || names.includes('preconditions')) this.show();
+  /** @param {string[]} [names] of sections that have changed; else it may be any */
+  draw(names) {
+    if (!names || names.includes('questions') || names.includes('preconditions')) this.show();
   }
 
   cancel() { return false; }

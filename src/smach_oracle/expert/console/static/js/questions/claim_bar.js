@@ -1,7 +1,6 @@
 // @ts-check
 // Who works on a question, and how to take it.
 import { h } from '../page/dom.js';
-import { render } from '../page/redraw.js';
 
 /**
  * @typedef {object} ClaimState
@@ -32,64 +31,48 @@ const RUN_OUT = 'Your claim has run out. It is made again as soon as all are hea
 const FREE = 'Nobody works on it. Your first key or tap of an answer takes it. ';
 const VIEWER = 'You are signed in as a viewer: you can watch, others answer.';
 
-export class ClaimBar {
-  /** @param {Use} use what its buttons do */
-  constructor(use) {
-    this.use = use;
-    this.root = h('div', { class: 'claim-bar', role: 'status' });
+/**
+ * @param {ClaimState} state
+ * @param {Use} use what its buttons do
+ */
+export function claimBar(state, use) {
+  const { problem } = state;
+  const { kind, words } = barOf(state, use);
+  return h('div', { key: 'claim', class: 'claim-bar ' + kind, role: 'status',
+    hidden: !words && !problem }, words && h('span', {}, words),
+  problem && h('span', { key: 'problem', class: 'problem', role: 'alert' }, problem));
+}
+
+/**
+ * @param {ClaimState} state
+ * @param {Use} use
+ * @returns {Bar}
+ */
+function barOf({ settled, now, mine, held, claiming, sending, mayAnswer, expert, gone, silent },
+  { leave, claim, takeOver }) {
+  if (settled) return { kind: '', words: null };
+  if (!now) return { kind: 'warn', words: [gone || CLOSED, button('Back to the list', leave)] };
+  const taken = now.holder === expert && (held || claiming); // and is not told yet
+  const holder = [h('strong', {}, now.holder || 'somebody'),
+    now.holder === expert && !mine && ELSEWHERE];
+  if (now.status === 'interface') {
+    const name = h('strong', {}, now.interface);
+    return { kind: '', words: ['Interface ', name, ' runs for it; ', holder, ' started it.'] };
   }
-
-  /**
-   * Press one of its buttons, if it is there.
-   * @param {string} action
-   */
-  press(action) {
-    const found = this.root.querySelector('[data-action="' + action + '"]');
-    if (found instanceof HTMLElement) found.click();
+  if (!mayAnswer) {
+    return { kind: '', words: [VIEWER, now.holder && [' ', holder, ' works on it.']] };
   }
-
-  /** @param {ClaimState} state */
-  show(state) {
-    const { problem } = state;
-    const { kind, words } = this.barOf(state);
-    render(this.root, h('div', { class: 'claim-bar ' + kind, role: 'status',
-      hidden: !words && !problem }, words && h('span', {}, words),
-    problem && h('span', { key: 'problem', class: 'problem', role: 'alert' }, problem)));
+  if (mine) {
+    return { kind: 'good', words: sending ? 'Sending…'
+      : ['It is yours. ', button('Leave it to others', leave)] };
   }
-
-  /**
-   * @param {ClaimState} state
-   * @returns {Bar}
-   */
-  barOf({ settled, now, mine, held, claiming, sending, mayAnswer, expert, gone, silent }) {
-    if (settled) return { kind: '', words: null };
-    if (!now) {
-      return { kind: 'warn', words: [gone || CLOSED, button('Back to the list', this.use.leave)] };
-    }
-    const taken = now.holder === expert && (held || claiming); // and is not told yet
-    const holder = [h('strong', {}, now.holder || 'somebody'),
-      now.holder === expert && !mine && ELSEWHERE];
-    if (now.status === 'interface') {
-      const name = h('strong', {}, now.interface);
-      return { kind: '', words: ['Interface ', name, ' runs for it; ', holder, ' started it.'] };
-    }
-    if (!mayAnswer) {
-      return { kind: '', words: [VIEWER, now.holder && [' ', holder, ' works on it.']] };
-    }
-    if (mine) return { kind: 'good', words: sending ? 'Sending…' : this.yours() };
-    if (now.holder && !taken) {
-      return { kind: 'warn', words: [holder, ' works on it. ', this.takeOver()] };
-    }
-    if (held && silent) return { kind: '', words: RUN_OUT };
-    if (claiming || held) return { kind: '', words: 'Taking it…' };
-    const take = button('Take it', this.use.claim, 'claim');
-    return { kind: '', words: [FREE, take] };
+  if (now.holder && !taken) {
+    const take = button('Take it over', takeOver, 'take-over');
+    return { kind: 'warn', words: [holder, ' works on it. ', take] };
   }
-
-  /** @returns {page.Child} */
-  yours() { return ['It is yours. ', button('Leave it to others', this.use.leave)]; }
-
-  takeOver() { return button('Take it over', this.use.takeOver, 'take-over'); }
+  if (held && silent) return { kind: '', words: RUN_OUT };
+  if (claiming || held) return { kind: '', words: 'Taking it…' };
+  return { kind: '', words: [FREE, button('Take it', claim, 'claim')] };
 }
 
 /**

@@ -1,9 +1,11 @@
 // @ts-check
 // The last seconds before a failure, beside its question: images frame by frame, what happened, and
 // the joints that moved most. Images come once somebody looks for more than the last one.
-import { h, options, replace, setText } from '../page/dom.js';
+import { h, replace, say, setText } from '../page/dom.js';
+import { redraw } from '../page/redraw.js';
 import { drawImage, imageCanvas } from '../sensors/image_canvas.js';
 import { HUES, JointPlot } from '../sensors/joint_plot.js';
+import { playButton, showPlaying } from '../sensors/play_buttons.js';
 
 const STEP_S = 0.1;
 const CALM_MS = 1000; // from image to image, for those who want little motion
@@ -60,7 +62,7 @@ export class LastSeconds {
     this.slider = h('input', { type: 'range', max: 0, step: STEP_S, 'data-replay': 'scrubber',
       'aria-label': 'Time before the failure', oninput: () => this.seek(Number(this.slider.value)),
       onkeydown: (event) => this.key(event) });
-    this.playButton = this.button('▶', 'Play', 'play', () => this.toggle());
+    this.playButton = playButton('▶', 'Play', 'play', () => this.toggle());
     this.time = h('span', { class: 'number last-time' });
     this.words = h('p', { class: 'last-words' });
     this.plot = new JointPlot();
@@ -78,27 +80,17 @@ export class LastSeconds {
       h('div', { class: 'row last-head' }, this.title, h('span', { class: 'spacer' }), this.choice),
       h('div', { class: 'last-stage' }, this.screen, this.joints), this.marks, this.slider,
       h('div', { class: 'row last-controls', role: 'group', 'aria-label': 'Replay' },
-        this.button('|◂', 'To the beginning', 'first', () => this.seek(-this.length)),
-        this.button('◂', 'One image back', 'back', () => this.step(-1)), this.playButton,
-        this.button('▸', 'One image on', 'on', () => this.step(1)),
-        this.button('▸|', 'To the failure', 'last', () => this.seek(0)),
+        playButton('|◂', 'To the beginning', 'first', () => this.seek(-this.length)),
+        playButton('◂', 'One image back', 'back', () => this.step(-1)), this.playButton,
+        playButton('▸', 'One image on', 'on', () => this.step(1)),
+        playButton('▸|', 'To the failure', 'last', () => this.seek(0)),
         h('span', { class: 'spacer' }), this.time),
       this.words);
   }
 
-  /**
-   * @param {string} sign
-   * @param {string} title
-   * @param {string} id
-   * @param {() => void} onclick
-   */
-  button(sign, title, id, onclick) {
-    return h('button', { class: 'tool', type: 'button', title, 'aria-label': title, onclick,
-      'data-replay': id }, sign);
-  }
-
   /** Show what has come. What is shown stays where the question is open no longer. */
   update() {
+    if (!this.root.hidden) this.showJoints(); // in the colours of now
     const number = this.app.store.get('replays')?.[this.question];
     if (!number || number === this.number) return;
     this.number = number;
@@ -123,7 +115,7 @@ export class LastSeconds {
     this.slider.min = String(-this.length);
     const seen = replay.cameras.filter((_, camera) => replay.frames.some(([each]) => (
       each === camera)));
-    replace(this.choice, options(seen, this.choice.value));
+    redraw(this.choice, seen.map((camera) => h('option', { key: camera }, camera)));
     this.choice.hidden = seen.length < 2;
     this.screen.hidden = !seen.length;
     this.joints.hidden = !replay.joints.length;
@@ -180,7 +172,7 @@ export class LastSeconds {
     if (this.t > -STEP_S) this.place(this.stops.length ? this.stops[0].t : -this.length);
     const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.timer = window.setInterval(() => this.playOn(calm), calm ? CALM_MS : STEP_S * 1000);
-    this.showPlaying();
+    showPlaying(this.playButton, Boolean(this.timer));
     this.load();
   }
 
@@ -198,20 +190,13 @@ export class LastSeconds {
   stop() {
     clearInterval(this.timer);
     this.timer = 0;
-    this.showPlaying();
+    showPlaying(this.playButton, Boolean(this.timer));
   }
 
   /** It is shown no longer. */
   end() {
     this.stop();
     this.resized.disconnect();
-  }
-
-  showPlaying() {
-    const title = this.timer ? 'Pause' : 'Play';
-    setText(this.playButton, this.timer ? '❚❚' : '▶');
-    this.playButton.title = title;
-    this.playButton.setAttribute('aria-label', title);
   }
 
   /** @param {KeyboardEvent} event on the time line, where arrows move as on any slider */
@@ -252,9 +237,7 @@ export class LastSeconds {
       if (!this.loading) this.load(1);
       return;
     }
-    const problem = typeof image === 'string' ? image : '';
-    setText(this.note, problem);
-    this.note.hidden = !problem;
+    say(this.note, typeof image === 'string' ? image : '');
     if (image instanceof Blob) this.drawn = this.drawn.then(() => this.draw(frame.index, image));
   }
 

@@ -5,24 +5,25 @@ import { FollowUp } from '../answering/follow_up.js';
 import { InterfacePanel } from '../interfaces/interface_panel.js';
 import { PerceptionPanel } from '../interfaces/perception_panel.js';
 import { NoReply, unlessLost } from '../page/connection.js';
-import { h, replace, say, setText } from '../page/dom.js';
+import { h, replace } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { duration } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { aged } from '../page/liveness.js';
+import { keep, redraw, render } from '../page/redraw.js';
 import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
 import { callsWords } from './calls.js';
-import { ClaimBar } from './claim_bar.js';
+import { claimBar } from './claim_bar.js';
 import { LastSeconds } from './last_seconds.js';
-import { Onlookers } from './onlookers.js';
+import { lookAt, lookAway, namesOf } from './onlookers.js';
 import { URGENT_S } from './queue_view.js';
-import { SilenceBar } from './silence_bar.js';
 import { failureCard, userdataCard, visitsCard } from './situation_cards.js';
 import { SituationCamera } from './situation_camera.js';
 
 const RETRY_MS = 3000; // after a claim that was lost, and could not be made again
 const LOST = 'The connection was lost before the robot had confirmed. Send it again: the same '
   + 'answer twice does no harm.';
+const OLD = ' any more. What is shown is old, and no answer is sent until it is heard again.';
 const NOT_TAKEN = 'The question could not be taken, so no answer was sent. Send it again.';
 const UNKNOWN = 'The robot has not confirmed in time: whether it has your answer is not known. The '
   + 'same answer twice does no harm.';
@@ -57,19 +58,14 @@ export class QuestionDetail {
     this.way = h('div', {}, visitsCard(question));
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
-    this.time = h('span', { class: 'time' });
-    this.silence = new SilenceBar(app.liveness, question);
-    this.onlookers = new Onlookers(app, question);
-    this.calls = h('p', { class: 'dim calls', hidden: true });
     /** @type {string | null} */
     this.robotGone = null; // how it went, and the question with it; null: it was open until now
-    this.claimBar = new ClaimBar({ leave: ways.leave, claim: () => this.claim('claim'),
-      takeOver: () => this.claim('take_over') });
     this.form = new AnswerForm(question, (answer) => this.answer(answer),
       () => { if (this.mayBegin && !this.settled) this.take(); });
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What should it do?'),
       this.form.root);
     this.title = h('h2', { tabindex: -1 }, question.state, ' ', question.stands);
+    this.top = h('div', {});
     this.root = this.build();
     this.show();
   }
@@ -78,8 +74,7 @@ export class QuestionDetail {
     const { question } = this;
     this.machine.show(question.robot, question.path);
     this.hand.show(question.robot, question.path);
-    return h('article', { class: 'detail', 'data-question': question.key }, this.head(),
-      this.silence.root, this.claimBar.root, this.onlookers.root, this.calls,
+    return h('article', { class: 'detail', 'data-question': question.key }, this.top,
       this.perceptionPlace, this.interfacePlace,
       h('div', { class: 'detail-body' },
         h('div', { class: 'situation' }, failureCard(question), this.camera.root,
@@ -89,14 +84,36 @@ export class QuestionDetail {
         this.answers));
   }
 
-  head() {
-    const { robot, path } = this.question;
-    return h('header', { class: 'detail-head' },
+  /**
+   * What may change while something below is held.
+   * @param {string} silent who must be heard, and is not
+   */
+  topView(silent) {
+    const { app, question, key, now, mine, settled, held, claiming, sending, problem } = this;
+    const { robot, path } = question;
+    const { mayAnswer, expert } = app;
+    const age = app.liveness.robot(robot);
+    const names = namesOf(app, key);
+    const calls = callsWords(app, key);
+    const left = now && now.deadline !== null ? now.deadline - app.store.now() : Infinity;
+    return h('div', { class: 'detail-top' }, h('header', { class: 'detail-head' },
       h('button', { class: 'back', 'aria-label': 'Back to the list',
         onclick: this.ways.leave }, '‹'),
-      h('div', {}, this.title,
-        h('p', { class: 'dim' }, robot, ' · ', path, ' ', this.silence.age)),
-      h('span', { class: 'spacer' }), this.time);
+      h('div', {}, keep(this.title), h('p', { class: 'dim' }, robot, ' · ', path, ' ',
+        h('span', { class: 'dim last-word' }, age !== null && 'heard ' + aged(age) + ' ago'))),
+      h('span', { class: 'spacer' }),
+      h('span', { class: 'time' + (left < URGENT_S ? ' urgent' : '') }, now && !settled && ('asked '
+        + duration(app.store.now() - now.asked) + ' ago · '
+        + (left === Infinity ? 'no time limit' : duration(left) + ' left')))),
+    h('div', { key: 'silence', class: 'silence-bar', hidden: !silent },
+      h('span', { role: 'alert' }, silent && 'Nothing is heard from ' + silent + OLD)),
+    claimBar({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
+      gone: this.robotGone || '', silent: Boolean(now && !settled && silent) }, {
+      leave: this.ways.leave, claim: () => this.claim('claim'),
+      takeOver: () => this.claim('take_over') }),
+    h('p', { key: 'onlookers', class: 'dim onlookers', role: 'status', hidden: !names.length },
+      names.length > 0 && 'Also looking at it: ' + names.join(', ') + '.'),
+    h('p', { key: 'calls', class: 'dim calls', hidden: !calls }, calls));
   }
 
   get key() { return this.question.key; }
@@ -111,17 +128,14 @@ export class QuestionDetail {
 
   /** Show it. To read it takes nothing. */
   begin() {
-    this.showPerception();
-    this.showInterface();
-    this.onlookers.look();
-    say(this.calls, callsWords(this.app, this.key));
+    lookAt(this.app, this.key);
     if (this.app.mayAnswer && this.mine) this.claim('claim'); // by a page of before: keep it
-    this.show();
+    this.draw();
   }
 
   /** The connection is back: so is the claim, if nobody has taken it meanwhile. */
   connected() {
-    this.onlookers.look();
+    lookAt(this.app, this.key);
     if (this.held && !this.settled) this.claim('claim');
     if (this.followUp) this.followUp.watch();
   }
@@ -132,7 +146,7 @@ export class QuestionDetail {
   end() {
     if (this.held && !this.settled) this.release();
     this.ended = true;
-    this.onlookers.leave();
+    lookAway(this.app, this.key);
     this.pause();
     this.camera.stop();
     this.lastSeconds.end();
@@ -219,28 +233,10 @@ export class QuestionDetail {
 
   /** @param {string} key */
   press(key) {
-    if (key === 't') this.claimBar.press('take-over');
-    else if (this.mayBegin && !this.settled) this.form.press(key);
-  }
-
-  tick() {
-    this.showClaim();
-    say(this.calls, callsWords(this.app, this.key));
-    this.hand.update();
-  }
-
-  showTime() {
-    const { now } = this;
-    if (!now || this.settled) {
-      setText(this.time, '');
-      return;
-    }
-    const clock = this.app.store.now();
-    const left = now.deadline === null ? Infinity : now.deadline - clock;
-    this.form.showPreconditions(this.app.store.get('preconditions')?.[this.key] || {}, clock);
-    setText(this.time, 'asked ' + duration(clock - now.asked) + ' ago · '
-      + (left === Infinity ? 'no time limit' : duration(left) + ' left'));
-    this.time.classList.toggle('urgent', left < URGENT_S);
+    const takeOver = this.top.querySelector('[data-action="take-over"]');
+    if (key === 't') {
+      if (takeOver instanceof HTMLElement) takeOver.click();
+    } else if (this.mayBegin && !this.settled) this.form.press(key);
   }
 
   /** The tools of a perception interface, for as long as one runs for this question. */
@@ -308,29 +304,28 @@ export class QuestionDetail {
     replace(this.interfacePlace);
   }
 
-  /** @param {string[]} names of sections */
-  update(names) {
+  /**
+   * Show it as it stands.
+   * @param {string[]} [names] of sections that have changed; else it may be any
+   */
+  draw(names) {
+    const { robot } = this.question;
+    const ofOthers = /** @param {string} name */ (name) => name.startsWith('live ')
+      && name !== 'live ' + robot;
+    if (names?.every(ofOthers)) return;
     /** @param {...string} wanted */
-    const changed = (...wanted) => wanted.some((name) => names.includes(name));
-    if (changed('questions', 'manipulation', 'interface_output', 'sensors', 'cameras')) {
-      this.showInterface();
-    }
-    if (changed('preconditions')) this.showTime();
-    if (changed('onlookers')) this.onlookers.show();
-    if (changed('reach')) say(this.calls, callsWords(this.app, this.key));
-    if (changed('images', 'cameras')) this.camera.update();
+    const changed = (...wanted) => !names || wanted.some((name) => names.includes(name));
+    this.showPerception();
+    this.showInterface();
+    if (changed('images', 'cameras')) this.camera.draw();
     if (changed('replays')) this.lastSeconds.update();
-    if (changed('sensors')) this.showPerception();
-    if (changed('questions')) {
-      if (this.now) redraw(this.way, visitsCard(this.now)); // events may come after the question
-      this.showClaim();
-    }
-    const machines = names.some((name) => name.startsWith('live ') || name.startsWith('graph '));
-    if (machines || changed('questions')) {
+    if (changed('questions')) redraw(this.way, visitsCard(this.now || this.question));
+    if (changed('questions', `live ${robot}`) || names?.some((name) => name.startsWith('graph '))) {
       this.machine.update();
       this.hand.update();
     }
-    if (this.followUp) this.followUp.update();
+    if (this.followUp) this.followUp.draw();
+    this.showClaim();
   }
 
   /** Who holds the claim where it is not this browser; '' where nobody does. */
@@ -378,14 +373,12 @@ export class QuestionDetail {
   }
 
   show() {
-    const { now, mine, settled, held, claiming, sending, problem } = this;
-    const { mayAnswer, expert } = this.app;
-    const silent = Boolean(now && !settled && this.silence.show());
+    const { app, key, now, settled, question } = this;
     this.robotGone = this.howItWent();
-    this.claimBar.show({ now, mine, settled, held, claiming, sending, problem, mayAnswer, expert,
-      gone: this.robotGone || '', silent });
-    this.root.classList.toggle('silent', silent || Boolean(this.robotGone));
-    this.form.enable(this.mayBegin && !sending && !settled && !silent);
-    this.showTime();
+    const silent = app.liveness.whoIsSilent(question);
+    render(this.top, this.topView(now && !settled ? silent : ''));
+    this.root.classList.toggle('silent', Boolean((now && !settled && silent) || this.robotGone));
+    this.form.show(this.mayBegin && !this.sending && !settled && !silent,
+      app.store.get('preconditions')?.[key] || {}, app.store.now());
   }
 }

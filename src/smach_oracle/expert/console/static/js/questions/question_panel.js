@@ -3,10 +3,10 @@
 import { waits } from '../page/alerts.js';
 import { SETTLING_MS } from '../page/deliberate.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
-import { h, modified, replace, say, setText, typing } from '../page/dom.js';
+import { h, modified, replace, typing } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { counted } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { keep, redraw, render } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { AlikeAnswer } from './alike_answer.js';
@@ -19,6 +19,8 @@ import { QueueTools, queueList } from './queue_view.js';
 export const questions = { id: 'questions', title: 'Questions',
   create: (app) => new QuestionPanel(app) };
 
+const SECTIONS = new RegExp('^(?:questions|servers|reach|onlookers|manipulation|interface_output'
+  + '|sensors|cameras|preconditions|images|replays|(?:live|graph) .*)$');
 const NO_SERVER = 'No robot with an expert query server is known yet.';
 const MOST_NAMED = 3; // query servers
 const GONE = 'The question of this address is not open: it was answered or taken back, or its time '
@@ -41,18 +43,14 @@ class QuestionPanel {
     this.missing = ''; // the question of an address, where it is not open
     this.tools = new QueueTools(() => this.showQueue());
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
+    this.side = h('aside', {});
     this.stage = h('div', { class: 'stage' });
-    this.unreached = h('p', { class: 'problem unreached', role: 'status', hidden: true });
-    this.servers = h('p', { class: 'dim servers' });
-    this.ages = h('p', { class: 'dim servers ages-below' }); // where the top bar is too narrow
-    this.root = h('div', { class: 'panel questions' },
-      h('aside', { class: 'queue-side' }, this.tools.root, this.queue, this.unreached,
-        this.servers, this.ages,
-        h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)), this.stage);
+    this.root = h('div', { class: 'panel questions' }, this.side, this.stage);
     this.nextKey = new SettledKey(() => this.next?.key || '');
     window.addEventListener('keydown', (event) => this.key(event));
     tellPresses(app, () => (this.detail?.held ? this.detail.key : ''));
     this.showStage();
+    this.showSide();
   }
 
   get open() { return this.app.store.questions; }
@@ -72,18 +70,14 @@ class QuestionPanel {
 
   badge() { return this.open.filter(waits).length; }
 
-  shown() {
-    this.update(['questions', 'servers']);
-    if (this.detail) this.detail.shown();
-  }
+  get sections() { return SECTIONS; }
+
+  /** A claim is kept, and what robots do after an answer is followed, behind other panels, too. */
+  get always() { return true; }
+
+  shown() { if (this.detail) this.detail.shown(); }
 
   connected() { if (this.detail) this.detail.connected(); }
-
-  tick() {
-    this.showQueue();
-    setText(this.ages, 'Heard: ' + this.app.liveness.ages() + ' ago');
-    if (this.detail) this.detail.tick();
-  }
 
   get place() { return this.detail?.key || ''; }
 
@@ -109,30 +103,39 @@ class QuestionPanel {
     }
   }
 
-  /** @param {string[]} names */
-  update(names) {
+  /** @param {string[]} [names] of sections that have changed; else it may be any */
+  draw(names) {
+    /** @param {...string} wanted */
+    const changed = (...wanted) => !names || wanted.some((name) => names.includes(name));
     // a console that has just begun may not have heard of it yet
     const comes = this.open.some(({ key }) => key === this.missing);
     if (comes && !this.detail && this.app.current === 'questions') this.wanted = this.missing;
     const focused = this.root.contains(document.activeElement);
-    if (names.includes('questions')) this.arrive();
-    if (names.includes('servers')) this.showServers();
-    if (names.includes('reach')) say(this.unreached, unreachedWords(this.app));
-    if (names.includes('questions') || names.includes('onlookers')) this.showQueue();
-    if (this.detail) this.detail.update(names);
+    if (changed('questions')) this.arrive();
+    if (changed('servers', 'reach')) this.showSide();
+    if (changed('questions', 'onlookers')) this.showQueue();
+    if (this.detail) this.detail.draw(names);
     else {
-      if (names.includes('questions')) this.showStage();
+      if (changed('questions')) this.showStage();
       if (focused && focusIsFree()) this.focusFirst(); // what had the focus has gone
     }
   }
 
-  showServers() {
+  showSide() {
     const servers = this.app.store.get('servers') || [];
     const gone = servers.filter(({ connected }) => !connected).map(({ name }) => name + ' (gone)');
     const names = servers.length > MOST_NAMED
       ? [counted(servers.length, 'expert query server'), ...gone]
       : servers.map(({ name, connected }) => name + (connected ? '' : ' (gone)'));
-    setText(this.servers, servers.length ? 'Listening to ' + names.join(', ') : NO_SERVER);
+    const unreached = unreachedWords(this.app);
+    render(this.side, h('aside', { class: 'queue-side' }, keep(this.tools.root), keep(this.queue),
+      h('p', { class: 'problem unreached', role: 'status', hidden: !unreached }, unreached),
+      h('p', { class: 'dim servers' },
+        servers.length ? 'Listening to ' + names.join(', ') : NO_SERVER),
+      // where the top bar is too narrow
+      h('p', { class: 'dim servers ages-below' },
+        'Heard: ' + this.app.liveness.ages() + ' ago'),
+      h('p', { class: 'dim servers no-emergency-stop' }, NO_EMERGENCY_STOP)));
   }
 
   showQueue() {
@@ -190,7 +193,7 @@ class QuestionPanel {
     } else this.close();
     this.turnTo(back || new QuestionDetail(this.app, question,
       { leave: () => this.leave(), choose: (...next) => this.choose(...next) }));
-    if (back) back.update(['questions', 'images']); // what it has missed
+    if (back) back.draw(); // what it has missed
     this.app.went();
   }
 
@@ -243,23 +246,27 @@ class QuestionPanel {
   }
 
   showStage() {
-    this.root.classList.toggle('working', Boolean(this.detail));
-    if (this.detail) {
-      replace(this.stage, this.detail.root);
-      this.stage.scrollTop = 0;
-      return;
+    const { detail, stage } = this;
+    this.root.classList.toggle('working', Boolean(detail));
+    if (!detail) redraw(stage, this.emptyStage());
+    else if (detail.root.parentElement !== stage) {
+      replace(stage, detail.root);
+      stage.scrollTop = 0;
     }
+  }
+
+  emptyStage() {
     const waiting = this.badge();
+    const open = this.open.length;
     const title = waiting ? counted(waiting, 'question waits', 'questions wait')
-      : (this.open.length ? 'Nobody is waited for' : 'All quiet');
+      : (open ? 'Nobody is waited for' : 'All quiet');
     const choose = keysOn() ? ['Choose one, or press ', h('kbd', {}, 'n'),
       ' for the next that nobody works on, and ', h('kbd', {}, '/'), ' to search.'] : 'Choose one.';
-    const others = 'Somebody works on ' + (this.open.length === 1 ? 'the open question.'
-      : 'each of the ' + this.open.length + ' open questions.');
-    const gone = this.missing && h('p', { class: 'question-gone', role: 'status' }, GONE);
-    const hint = h('p', {}, waiting ? choose : (this.open.length ? others : QUIET));
-    replace(this.stage, h('div', { class: 'empty' }, gone, h('h2', { tabindex: -1 }, title),
-      hint));
+    const others = 'Somebody works on ' + (open === 1 ? 'the open question.'
+      : 'each of the ' + open + ' open questions.');
+    return h('div', { class: 'empty' },
+      this.missing && h('p', { class: 'question-gone', role: 'status' }, GONE),
+      h('h2', { tabindex: -1 }, title), h('p', {}, waiting ? choose : (open ? others : QUIET)));
   }
 
   /** @param {KeyboardEvent} event */

@@ -1,7 +1,8 @@
 // @ts-check
 // The robot's cameras beside a question: what they gave at the failure, and live once somebody
 // wants it. Side by side; on a phone one or the other.
-import { h, options, replace, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
+import { keep, render } from '../page/redraw.js';
 import { CameraView } from '../sensors/camera_view.js';
 import { FailureImageView } from '../sensors/failure_image_view.js';
 
@@ -20,27 +21,62 @@ export class SituationCamera {
     this.app = app;
     this.question = question;
     this.live = false;
+    /** @type {Pane} */
+    this.pane = 'then'; // on a phone: which of the two is shown
+    this.topic = '';
     /** @type {server.KeptImage[]} */
     this.images = []; // of the failure
-    /** @type {number | null} */
-    this.shownImage = null;
-    this.shape = ''; // of what there is to choose from
-    this.topic = ''; // of the live view
-    /** @type {CameraView | null} */
-    this.view = null;
-    this.choice = h('select', { 'aria-label': 'Camera', onchange: () => this.look() });
-    this.then = h('div', { class: 'pane then' });
-    this.now = h('div', { class: 'pane now' });
-    this.tabs = [this.tab('then', 'At the failure'), this.tab('now', 'Live')];
-    this.toggle = h('button', { class: 'tool', type: 'button', 'data-action': 'live-camera',
-      onclick: () => this.setLive(!this.live) });
-    this.panes = h('div', { class: 'panes' }, this.then, this.now);
-    this.root = h('section', { class: 'card situation-camera' },
+    /** @type {{ id: number, root: HTMLElement } | null} */
+    this.then = null;
+    /** @type {{ topic: string, view: CameraView } | null} */
+    this.now = null;
+    this.root = h('section', {});
+    this.draw();
+  }
+
+  draw() {
+    const { store } = this.app;
+    this.images = store.get('images')?.[this.question.key] || this.images;
+    const topics = [...new Set([...this.images.map((image) => image.topic),
+      ...(store.get('cameras')?.[this.question.robot] || [])])];
+    if (!topics.includes(this.topic)) this.topic = topics[0] || '';
+    if (!topics.length) this.live = false;
+    const image = this.images.find((each) => each.topic === this.topic);
+    if (this.then?.id !== image?.id) {
+      this.then = image ? { id: image.id, root: new FailureImageView(this.app, image).root } : null;
+    }
+    this.watch(this.live ? this.topic : '');
+    render(this.root, this.view(topics));
+  }
+
+  /** @param {string} topic '' for none */
+  watch(topic) {
+    if (topic === (this.now?.topic || '')) return;
+    this.stop();
+    this.now = topic ? { topic, view: new CameraView(this.app, topic) } : null;
+  }
+
+  /** @param {string[]} topics */
+  view(topics) {
+    const { live, then, now, pane } = this;
+    const none = !topics.length;
+    return h('section', { class: 'card situation-camera' + (none ? ' none' : '') },
       h('div', { class: 'row camera-head' }, h('h3', {}, 'Camera'),
-        h('div', { class: 'row pane-tabs', role: 'group', 'aria-label': 'Which image' }, this.tabs),
-        h('span', { class: 'spacer' }), this.choice, this.toggle), this.panes);
-    this.turn('then');
-    this.update();
+        h('div', { class: 'row pane-tabs', role: 'group', 'aria-label': 'Which image' },
+          this.tab('then', 'At the failure'), this.tab('now', 'Live')),
+        h('span', { class: 'spacer' }),
+        h('select', { 'aria-label': 'Camera', hidden: topics.length < 2, onchange: ({ target }) => {
+          if (target instanceof HTMLSelectElement) this.topic = target.value;
+          this.draw();
+        } }, topics.map((topic) => h('option', { key: topic, value: topic,
+          selected: topic === this.topic }, topic))),
+        h('button', { class: 'tool', type: 'button', 'data-action': 'live-camera', hidden: none,
+          'aria-pressed': live, onclick: () => this.setLive(!this.live) },
+        live ? 'Stop live' : 'Show live')),
+      h('div', { class: 'panes' + (then && live ? '' : ' one'), 'data-shown': pane },
+        h('div', { class: 'pane then', hidden: !then }, then && keep(then.root)),
+        h('div', { class: 'pane now', hidden: Boolean(then) && !live }, now ? keep(now.view.root)
+          : h('p', { class: 'dim' }, none ? NO_CAMERA : UNKNOWN))));
   }
 
   /**
@@ -49,73 +85,17 @@ export class SituationCamera {
    */
   tab(pane, text) {
     return h('button', { class: 'tool', type: 'button', 'data-pane': pane,
-      onclick: () => this.turn(pane) }, text);
-  }
-
-  update() {
-    this.images = this.app.store.get('images')?.[this.question.key] || this.images;
-    const topics = [...new Set([...this.images.map((image) => image.topic),
-      ...(this.app.store.get('cameras')?.[this.question.robot] || [])])];
-    const shape = JSON.stringify([topics, this.images]);
-    if (shape === this.shape) return;
-    this.shape = shape;
-    replace(this.choice, options(topics, this.choice.value));
-    this.choice.hidden = topics.length < 2;
-    this.root.classList.toggle('none', !topics.length);
-    if (!topics.length) this.live = false;
-    this.toggle.hidden = !topics.length;
-    this.look();
-  }
-
-  /**
-   * On a phone: which of the two is shown.
-   * @param {Pane} pane
-   */
-  turn(pane) {
-    this.panes.dataset['shown'] = pane;
-    for (const tab of this.tabs) {
-      tab.setAttribute('aria-pressed', String(tab.dataset['pane'] === pane));
-    }
-    if (pane === 'now') this.setLive(true);
+      'aria-pressed': pane === this.pane, onclick: () => {
+        this.pane = pane;
+        this.setLive(this.live || pane === 'now');
+      } }, text);
   }
 
   /** @param {boolean} on */
   setLive(on) {
     this.live = on;
-    this.look();
+    this.draw();
   }
 
-  look() {
-    const topic = this.choice.value;
-    const image = this.images.find((each) => each.topic === topic);
-    this.panes.classList.toggle('one', !image || !this.live);
-    this.showImage(image);
-    this.then.hidden = !image;
-    this.now.hidden = Boolean(image) && !this.live;
-    setText(this.toggle, this.live ? 'Stop live' : 'Show live');
-    this.toggle.setAttribute('aria-pressed', String(this.live));
-    this.showLive(this.live ? topic : '');
-    if (!topic || (!image && !this.live)) {
-      replace(this.now, h('p', { class: 'dim' }, topic ? UNKNOWN : NO_CAMERA));
-    }
-  }
-
-  /** @param {server.KeptImage | undefined} image */
-  showImage(image) {
-    const id = image ? image.id : null;
-    if (id === this.shownImage) return;
-    this.shownImage = id;
-    replace(this.then, image && new FailureImageView(this.app, image).root);
-  }
-
-  /** @param {string} topic '' for none */
-  showLive(topic) {
-    if (topic === this.topic) return;
-    this.topic = topic;
-    this.stop();
-    this.view = topic ? new CameraView(this.app, topic) : null;
-    replace(this.now, this.view && this.view.root);
-  }
-
-  stop() { if (this.view) this.view.stop(); }
+  stop() { this.now?.view.stop(); }
 }

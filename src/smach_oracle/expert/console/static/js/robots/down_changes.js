@@ -1,6 +1,7 @@
 // @ts-check
 // What may be changed in the store of a machine that is down, before it goes on.
-import { h, options, replace, setText, toast } from '../page/dom.js';
+import { h, replace, setText, toast } from '../page/dom.js';
+import { redraw } from '../page/redraw.js';
 
 /** @typedef {'goto_stored' | 'edit_stored' | 'drop_stored'} Change */
 
@@ -16,8 +17,6 @@ export class DownChanges {
   constructor(app, row) {
     this.app = app;
     this.row = row;
-    this.states = '';
-    this.items = '';
     this.state = h('select', { 'aria-label': 'State at which it goes on',
       onchange: () => this.showMeaning() });
     this.going = h('button', { type: 'submit', 'data-action': 'goto-stored' }, 'Go on there');
@@ -47,20 +46,11 @@ export class DownChanges {
    */
   show(row) {
     this.row = row;
-    const states = JSON.stringify(row.states);
-    if (states !== this.states) {
-      this.states = states;
-      replace(this.state, options(row.states, this.state.value));
-    }
-    const items = JSON.stringify(row.userdata.map(([path, key]) => [path, key]));
-    if (items !== this.items) {
-      const before = this.item.value;
-      this.items = items;
-      replace(this.item, row.userdata.map(([path, key]) => {
-        const value = JSON.stringify([path, key]);
-        return h('option', { value, selected: value === before }, path + ' ' + key);
-      }));
-    }
+    redraw(this.state, row.states.map((value) => h('option', { key: value, value }, value)));
+    redraw(this.item, row.userdata.map(([path, key]) => {
+      const value = JSON.stringify([path, key]);
+      return h('option', { key: value, value }, path + ' ' + key);
+    }));
     const { mayAnswer, connection } = this.app;
     const may = mayAnswer && connection.connected;
     this.going.disabled = !may || !row.states.length;

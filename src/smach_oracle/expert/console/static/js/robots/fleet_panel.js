@@ -45,12 +45,7 @@ class FleetPanel {
   /** @param {RobotFacts[]} robots */
   pausedOf(robots) { return robots.filter(({ paused }) => paused.length); }
 
-  /** @param {string[]} names */
-  update(names) {
-    if (this.app.current !== 'fleet') return;
-    if (names.some((name) => ['robots', 'questions', 'health', 'heard'].includes(name)
-      || name.startsWith('live '))) this.drawSoon();
-  }
+  get sections() { return /^(?:robots|questions|health|heard|live .*)$/; }
 
   /** Robots of a large fleet say something all the time: they are shown a few times a second. */
   drawSoon() {
@@ -60,8 +55,13 @@ class FleetPanel {
     }, BETWEEN_MS);
   }
 
-  draw() {
+  /** @param {string[]} [names] of sections that have changed */
+  draw(names) {
     const { app } = this;
+    if (names) {
+      this.drawSoon();
+      return;
+    }
     this.facts = byNeed(robotsOf(app).map((robot) => factsOf(app, robot)));
     for (const { robot, holdable, standing } of this.facts) {
       if (!holdable || standing === 'gone') this.wanted.delete(robot);

@@ -1,8 +1,6 @@
 // @ts-check
 // How a machine stands as its operators see it, in words.
 
-/** @typedef {import('../page/store.js').Store} Store */
-
 /**
  * The machine to which a container belongs; undefined where it is of none.
  * @param {server.HeldMachine[]} machines
@@ -55,7 +53,7 @@ export function byContainer(states) {
  * that no rates are told of.
  * @param {Pick<server.ActiveState, 'path' | 'state'>} active
  * @param {string} robot
- * @param {Pick<Store, 'get'>} store
+ * @param {Pick<page.Store, 'get'>} store
  */
 export function isOracle({ path, state }, robot, store) {
   const graph = store.get(`graph ${robot} ${path}`);
@@ -67,7 +65,7 @@ export function isOracle({ path, state }, robot, store) {
  * What the oracle of a container is at, as a sentence; '' where the state is no oracle.
  * @param {server.ActiveState} active
  * @param {string} robot
- * @param {Pick<Store, 'get' | 'questions'>} store
+ * @param {Pick<page.Store, 'get' | 'questions'>} store
  */
 function oracleWords(active, robot, store) {
   if (!isOracle(active, robot, store)) return '';
@@ -82,7 +80,7 @@ function oracleWords(active, robot, store) {
 /**
  * @param {server.HeldMachine} machine
  * @param {string} robot
- * @param {Pick<Store, 'get' | 'questions'>} store for what an oracle is at
+ * @param {Pick<page.Store, 'get' | 'questions'>} store for what an oracle is at
  */
 export function standingWords(machine, robot, store) {
   const waits = waiting(machine);

@@ -1,14 +1,13 @@
 // @ts-check
 // One container: its drawing, one of its states with those around, or its list.
-import { h, replace, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { remember, remembered } from '../page/preferences.js';
+import { keep, render } from '../page/redraw.js';
 import { AroundView } from './around_view.js';
 import { activeIn } from './focus_state.js';
 import { GraphView } from './graph_view.js';
 import { StateList } from './state_list.js';
 import { StateSearch } from './state_search.js';
-
-/** @typedef {import('../page/store.js').Store} Store */
 
 const UNKNOWN = 'Nothing is known of this machine. It is shown while its introspection is on.';
 const NOT_DRAWN = 'There is no drawing of it, or not yet. Drawings need Graphviz on the console’s '
@@ -25,7 +24,7 @@ const WAYS = [['graph', 'Graph', 'All states, drawn'],
 
 /**
  * Machines as they are now.
- * @param {Store} store
+ * @param {page.Store} store
  * @returns {machine.MachineSource}
  */
 export function machinesNow(store) {
@@ -38,7 +37,7 @@ export function machinesNow(store) {
 /**
  * What a robot's section and its open questions say: a page that came late has not heard of the
  * failure.
- * @param {Store} store
+ * @param {page.Store} store
  * @param {string} robot
  * @returns {machine.MachineState}
  */
@@ -65,19 +64,9 @@ export class MachineView {
     this.around = new AroundView(onOpen);
     this.list = new StateList(onOpen);
     this.search = new StateSearch(() => this.update(), (label) => this.find(label));
-    this.note = h('p', { class: 'dim note' });
-    this.buttons = new Map(WAYS.map(([way, name, title]) => [way,
-      h('button', { class: 'tool', title, 'data-way': way, onclick: () => this.prefer(way) },
-        name)]));
-    this.bar = h('div', { class: 'row wrap machine-bar' }, this.search.root,
-      h('span', { class: 'spacer' }),
-      h('div', { class: 'row', role: 'group', 'aria-label': 'How the machine is shown' },
-        [...this.buttons.values()]));
-    this.root = h('div', { class: 'machine-view' });
+    this.root = h('div', {});
     this.robot = '';
     this.path = '';
-    /** @type {Way | '' | null} */
-    this.shown = null;
   }
 
   /**
@@ -105,30 +94,35 @@ export class MachineView {
   }
 
   update() {
-    const { data } = this;
-    const machine = this.source.state(this.robot);
-    if (!data) {
-      replace(this.root, h('p', { class: 'empty' }, UNKNOWN));
-      this.shown = null;
-      return;
-    }
-    const shown = wayOf(data);
-    const part = shown && { graph: this.graph, around: this.around, list: this.list }[shown].root;
-    if (shown !== this.shown) replace(this.root, this.bar, this.note, part || []);
-    this.shown = shown;
-    for (const [way, button] of this.buttons) {
-      button.setAttribute('aria-pressed', String(way === shown));
-      button.hidden = way === 'graph' ? !data.drawn : !data.states.length;
-    }
-    this.search.set(data);
-    setText(this.note, noteOn(data, machine));
-    if (shown === 'graph') {
-      this.graph.set(this.robot, data);
+    const { data, robot, search } = this;
+    const machine = this.source.state(robot);
+    const shown = data ? wayOf(data) : '';
+    if (data) search.set(data);
+    render(this.root, h('div', { class: 'machine-view' }, data ? this.view(data, machine, shown)
+      : h('p', { class: 'empty' }, UNKNOWN)));
+    if (data && shown === 'graph') {
+      this.graph.set(robot, data);
       this.graph.setState(machine);
-    } else if (shown === 'around') this.around.set(this.robot, data, machine);
-    else if (shown === 'list') {
-      this.list.set(this.robot, data, machine, (label) => this.search.has(label));
+    } else if (data && shown === 'around') this.around.set(robot, data, machine);
+    else if (data && shown === 'list') {
+      this.list.set(robot, data, machine, (label) => search.has(label));
     }
+  }
+
+  /**
+   * @param {server.Graph} data
+   * @param {machine.MachineState} machine
+   * @param {Way | ''} shown
+   * @returns {page.Child[]}
+   */
+  view(data, machine, shown) {
+    return [h('div', { class: 'row wrap machine-bar' }, keep(this.search.root),
+      h('span', { class: 'spacer' }),
+      h('div', { class: 'row', role: 'group', 'aria-label': 'How the machine is shown' },
+        WAYS.map(([way, name, title]) => h('button', { class: 'tool', title, 'data-way': way,
+          'aria-pressed': way === shown, hidden: way === 'graph' ? !data.drawn
+            : !data.states.length, onclick: () => this.prefer(way) }, name)))),
+    h('p', { class: 'dim note' }, noteOn(data, machine)), shown && keep(this[shown].root)];
   }
 }
 

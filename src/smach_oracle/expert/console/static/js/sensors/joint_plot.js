@@ -32,7 +32,15 @@ export class JointPlot {
     const [bottom, top] = [low - 0.08 * (high - low), high + 0.2 * (high - low)];
     /** @param {number} value */
     const y = (value) => height * (top - value) / (top - bottom);
-    this.drawLevels(context, [low, (low + high) / 2, high], y, values.length > 0);
+    const levels = [low, (low + high) / 2, high];
+    const style = getComputedStyle(canvas);
+    context.strokeStyle = style.borderBottomColor;
+    for (const level of levels) {
+      context.beginPath();
+      context.moveTo(0, y(level));
+      context.lineTo(width, y(level));
+      context.stroke();
+    }
     curves.forEach((curve, index) => {
       context.strokeStyle = 'hsl(' + HUES[index] + ' 70% 58%)';
       context.lineWidth = 1.8;
@@ -42,25 +50,24 @@ export class JointPlot {
       }
       context.stroke();
     });
+    if (values.length) this.writeLevels(context, levels, y);
   }
 
   /**
+   * Over the curves, on a ground of their own.
    * @param {CanvasRenderingContext2D} context
    * @param {number[]} levels
    * @param {(value: number) => number} y
-   * @param {boolean} numbered
    */
-  drawLevels(context, levels, y, numbered) {
+  writeLevels(context, levels, y) {
     const style = getComputedStyle(this.canvas);
     context.font = '11px ' + style.fontFamily;
-    context.fillStyle = style.color;
-    context.strokeStyle = style.borderBottomColor;
     for (const level of levels) {
-      context.beginPath();
-      context.moveTo(0, y(level));
-      context.lineTo(this.canvas.clientWidth, y(level));
-      context.stroke();
-      if (numbered) context.fillText(level.toFixed(3), 4, y(level) - 3);
+      const text = level.toFixed(3);
+      context.fillStyle = style.backgroundColor;
+      context.fillRect(2, y(level) - 14, context.measureText(text).width + 4, 13);
+      context.fillStyle = style.color;
+      context.fillText(text, 4, y(level) - 3);
     }
   }
 }

@@ -1,6 +1,6 @@
 // @ts-check
 // Joint states: a table, and the chosen ones over the last minute.
-import { h, replace, setText } from '../page/dom.js';
+import { h, replace, say, setText } from '../page/dom.js';
 import { arrange } from '../page/redraw.js';
 import { HUES, JointPlot, SPAN_S } from './joint_plot.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
@@ -37,7 +37,8 @@ export class JointsView {
     this.choose(0);
     /** @type {SensorFeed<server.JointFacts>} */
     this.feed = new SensorFeed(app, () => numberOf(app, topic, type), this.root,
-      { every: PERIOD_MS, take: (_, facts) => this.take(facts), say: (text) => this.say(text) });
+      { every: PERIOD_MS, take: (_, facts) => this.take(facts),
+        say: (text) => say(this.note, text) });
   }
 
   /** @param {string} topic */
@@ -55,12 +56,6 @@ export class JointsView {
   }
 
   stop() { this.feed.stop(); }
-
-  /** @param {string} text */
-  say(text) {
-    setText(this.note, text);
-    this.note.hidden = !text;
-  }
 
   /** @param {number} quantity */
   choose(quantity) {

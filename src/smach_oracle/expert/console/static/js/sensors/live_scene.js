@@ -4,7 +4,7 @@ import { CloudLayer, unpacked } from '../drawing/cloud_layer.js';
 import { GridLayer } from '../drawing/grid_layer.js';
 import { SceneView } from '../drawing/scene_view.js';
 import { boxAround, vector } from '../drawing/transforms.js';
-import { h, replace, setText } from '../page/dom.js';
+import { h, replace, say, setText } from '../page/dom.js';
 import { RobotFeed } from './robot_feed.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
@@ -172,8 +172,7 @@ export class LiveScene {
     const lacks = this.robot ? this.robot.lacks : '';
     const lost = this.cloud && this.robot && this.cloud.facts.astray;
     const text = [lost, cloud, lacks || robot].filter(Boolean).join(' ');
-    setText(this.lack, something ? text : '');
-    this.lack.hidden = !something || !text;
+    say(this.lack, something ? text : '');
   }
 }
 

@@ -3,8 +3,9 @@
 // known by the server's number alone.
 import { h } from '../page/dom.js';
 import { counted } from '../page/format.js';
-import { redrawWith } from '../page/redraw.js';
 
+/** @type {server.BagOverview} */
+const NONE = { trials: [], table: [], note: '', broken: [], waiting: 0 };
 const LOST = 'The connection was lost; choose the trial again.';
 
 export class RecordedTrials {
@@ -19,30 +20,9 @@ export class RecordedTrials {
     this.opened = null;
     this.problem = '';
     this.wanted = -1; // number of the trial that is being opened
-    this.root = h('div', { class: 'bag-notes', hidden: true });
   }
 
-  get overview() { return this.app.store.get('bags'); }
-
-  get trials() { return this.overview?.trials || []; }
-
-  get table() { return this.overview?.table || []; }
-
-  /** Whether there is something to be said of bags. */
-  get hasNotes() {
-    const { note, broken, waiting } = this.overview || { note: '', broken: [], waiting: 0 };
-    return Boolean(note || broken.length || waiting);
-  }
-
-  update() {
-    const { overview } = this;
-    const { note, broken, waiting } = overview || { note: '', broken: [], waiting: 0 };
-    this.root.hidden = !this.hasNotes;
-    redrawWith(this.root, [note, broken, waiting], () => [
-      waiting > 0 && h('p', { class: 'dim', role: 'status' },
-        'Reading bags: ' + waiting + (waiting === 1 ? ' is' : ' are') + ' still to be read.'),
-      note && h('p', { class: 'dim' }, note), broken.length > 0 && brokenBags(broken)]);
-  }
+  get overview() { return this.app.store.get('bags') || NONE; }
 
   /** @param {number} number */
   async open(number) {
@@ -69,10 +49,17 @@ export class RecordedTrials {
   }
 }
 
-/** @param {server.BagOverview['broken']} broken */
-function brokenBags(broken) {
-  return h('details', { class: 'broken-bags' },
+/**
+ * What is to be said of bags.
+ * @param {server.BagOverview} overview
+ * @returns {page.Child[]}
+ */
+export function bagNotes({ note, broken, waiting }) {
+  return [waiting > 0 && h('p', { class: 'dim', role: 'status' },
+    'Reading bags: ' + waiting + (waiting === 1 ? ' is' : ' are') + ' still to be read.'),
+  note && h('p', { class: 'dim' }, note),
+  broken.length > 0 && h('details', { class: 'broken-bags' },
     h('summary', {}, counted(broken.length, 'bag') + ' could not be read'),
     h('ul', {}, broken.map(({ name, reason }) => (
-      h('li', {}, h('strong', {}, name), ': ', reason)))));
+      h('li', {}, h('strong', {}, name), ': ', reason)))))].filter(Boolean);
 }

@@ -1,6 +1,7 @@
 // @ts-check
 // The buttons of a replay.
 import { h, setText } from '../page/dom.js';
+import { playButton as button, showPlaying } from '../sensors/play_buttons.js';
 
 const SPEEDS = [0.25, 1, 4, 16, 64, 256];
 
@@ -38,12 +39,7 @@ export class ReplayControls {
   get speed() { return Number(this.speedChoice.value); }
 
   /** @param {boolean} playing */
-  showPlaying(playing) {
-    const title = playing ? 'Pause' : 'Play';
-    setText(this.playButton, playing ? '❚❚' : '▶');
-    this.playButton.title = title;
-    this.playButton.setAttribute('aria-label', title);
-  }
+  showPlaying(playing) { showPlaying(this.playButton, playing); }
 
   /** @param {boolean} on */
   showFollowing(on) { this.liveButton.setAttribute('aria-pressed', String(on)); }
@@ -53,15 +49,4 @@ export class ReplayControls {
 
   /** @param {string} text */
   showTime(text) { setText(this.time, text); }
-}
-
-/**
- * @param {string} sign
- * @param {string} title
- * @param {string} id
- * @param {() => void} onclick
- */
-function button(sign, title, id, onclick) {
-  return h('button', { class: 'tool', type: 'button', title, 'aria-label': title, onclick,
-    'data-replay': id }, sign);
 }

@@ -1,12 +1,12 @@
 // @ts-check
 // Trials: the counts of the paper's Table I, the list, and one trial on its time axis, to be
 // replayed.
-import { h, replace, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { clock } from '../page/format.js';
-import { redrawWith } from '../page/redraw.js';
+import { keep, render } from '../page/redraw.js';
 import { countsTable } from './counts_table.js';
 import { EventLog } from './event_log.js';
-import { RecordedTrials } from './recorded_trials.js';
+import { RecordedTrials, bagNotes } from './recorded_trials.js';
 import { TrialList, isOfBag, isRunning, summaryOf } from './trial_list.js';
 import { TrialReplay } from './trial_replay.js';
 
@@ -39,27 +39,16 @@ class TrialPanel {
     this.follows = true; // the newest trial is shown, until a person chooses
     /** @type {server.TrialEvent[]} */
     this.events = [];
-    this.table = h('div', { class: 'table-frame card trial-counts' });
-    this.list = new TrialList((id) => this.choose(id), () => this.update(['trials']));
+    this.list = new TrialList((id) => this.choose(id), () => this.draw());
     this.replay = new TrialReplay(app, (event) => this.log.mark(event.seq));
     this.recorded = new RecordedTrials(app, () => this.showRecorded());
-    this.title = h('h2', {});
-    this.facts = h('p', { class: 'dim' });
-    this.problem = h('p', { class: 'problem', role: 'alert' });
     this.log = new EventLog((seq) => this.replay.pick(seq));
-    this.detail = h('section', { class: 'card trial-detail' },
-      h('div', {}, this.title, this.facts, this.problem), this.replay.root);
     this.replay.root.append(h('div', { class: 'replay-below' }, this.replay.stage, this.log.root));
-    this.body = [this.table, this.recorded.root,
-      h('div', { class: 'trial-body' }, this.list.root, this.detail)];
-    this.empty = h('p', { class: 'empty' }, NO_TRIALS);
-    this.root = h('div', { class: 'panel trials' }, this.empty);
+    this.root = h('div', {});
     app.store.onEvents((slice) => this.take(slice));
   }
 
   get isCurrent() { return this.app.current === 'trials'; }
-
-  shown() { this.update(['trials', 'bags']); }
 
   get place() { return this.follows ? '' : this.chosen; }
 
@@ -67,7 +56,7 @@ class TrialPanel {
   goTo(id) {
     this.wanted = id;
     if (!id) this.follows = true;
-    this.update(['trials', 'bags']);
+    this.draw();
   }
 
   connected() { if (this.chosen && !this.bag) this.watch(this.chosen); }
@@ -79,9 +68,9 @@ class TrialPanel {
     const trial = this.all.find((each) => each.id === id);
     if (trial) this.open(trial);
     else this.watch(id);
-    this.update(['trials']);
+    this.draw();
     this.app.went();
-    if (matchMedia(NARROW).matches) this.detail.scrollIntoView();
+    if (matchMedia(NARROW).matches) this.replay.root.parentElement?.scrollIntoView();
   }
 
   /** @param {server.Trial} trial */
@@ -102,7 +91,6 @@ class TrialPanel {
     this.chosen = id;
     this.bag = bag;
     this.events = [];
-    setText(this.problem, '');
     this.log.clear();
   }
 
@@ -116,45 +104,56 @@ class TrialPanel {
   }
 
   showRecorded() {
-    const { opened, problem } = this.recorded;
-    setText(this.problem, this.bag ? problem : '');
-    if (!this.bag || !opened || opened.number !== this.bag.number) return;
-    this.events = opened.events;
-    this.showEvents();
+    const { opened } = this.recorded;
+    if (opened && opened.number === this.bag?.number) this.events = opened.events;
+    this.draw();
   }
 
   /** @param {server.EventSlice} slice */
   take({ trial, from, events }) {
     if (this.bag || trial !== this.chosen || from > this.events.length) return;
     this.events = this.events.slice(0, from).concat(events);
-    this.showEvents();
+    if (this.isCurrent) this.showEvents();
   }
 
   /** Those that the server has heard of, then those in bags that it has not, newest first. */
   get all() {
     const heard = this.app.store.get('trials')?.trials || [];
     const ids = new Set(heard.map((trial) => trial.id));
-    return heard.concat(this.recorded.trials.filter((trial) => !ids.has(trial.id)));
+    return heard.concat(this.recorded.overview.trials.filter((trial) => !ids.has(trial.id)));
   }
 
-  /** @param {string[]} names */
-  update(names) {
-    if (!this.isCurrent) return; // `shown` draws it
-    const drawings = names.some((name) => name.startsWith('graph '));
-    if (drawings && !this.bag) this.replay.redraw();
-    if (!names.includes('trials') && !names.includes('bags')) return;
-    this.recorded.update();
+  get sections() { return /^(?:trials|bags|graph .*)$/; }
+
+  /** @param {string[]} [names] of sections that have changed */
+  draw(names) {
+    if (!this.isCurrent) return; // it is drawn as it comes
     const { all } = this;
-    if (!all.length && !this.recorded.hasNotes) {
-      replace(this.root, this.empty);
-      return;
-    }
-    if (!this.root.contains(this.table)) replace(this.root, this.body);
+    if (!this.bag && names?.some((name) => name.startsWith('graph '))) this.replay.redraw();
     if (all.length) this.settle(all);
-    this.showTable();
+    this.trial = all.find((each) => each.id === this.chosen) || this.trial;
     this.list.show(all, this.chosen);
-    const trial = all.find((each) => each.id === this.chosen);
-    if (trial) this.showFacts(trial);
+    render(this.root, h('div', { class: 'panel trials' }, this.view(all.length)));
+    this.showEvents();
+  }
+
+  /** @param {number} count of trials */
+  view(count) {
+    const { trial, recorded } = this;
+    const { table: bags } = recorded.overview;
+    const notes = bagNotes(recorded.overview);
+    if (!count && !notes.length) return h('p', { key: 'none', class: 'empty' }, NO_TRIALS);
+    const heard = this.app.store.get('trials')?.table || [];
+    return [h('div', { class: 'table-frame card trial-counts',
+      hidden: !heard.length && !bags.length },
+    heard.length > 0 && countsTable(HEARD, heard), bags.length > 0 && countsTable(IN_BAGS, bags)),
+    h('div', { class: 'bag-notes', hidden: !notes.length }, notes),
+    h('div', { class: 'trial-body' }, keep(this.list.root),
+      h('section', { class: 'card trial-detail' },
+        h('div', {}, h('h2', {}, trial?.experiment, ' · ', trial && clock(trial.start)),
+          h('p', { class: 'dim' }, trial && this.factsOf(trial)),
+          h('p', { class: 'problem', role: 'alert' }, this.bag && recorded.problem)),
+        keep(this.replay.root)))];
   }
 
   /**
@@ -177,29 +176,17 @@ class TrialPanel {
     this.open(newest);
   }
 
-  showTable() {
-    const heard = this.app.store.get('trials')?.table || [];
-    const bags = this.recorded.table;
-    this.table.hidden = !heard.length && !bags.length;
-    redrawWith(this.table, [heard, bags], () => [
-      heard.length > 0 && countsTable(HEARD, heard),
-      bags.length > 0 && countsTable(IN_BAGS, bags)]);
-  }
-
   /** @param {server.Trial} trial */
-  showFacts(trial) {
-    this.trial = trial;
-    const { experiment, start, lost, nth, detailed, bag } = trial;
-    setText(this.title, experiment + ' · ' + clock(start));
-    setText(this.facts, [summaryOf(trial, this.app.store.now()),
-      nth && `trial ${nth} of its program`, lost && lostEvents(trial),
-      !detailed && 'its events are no longer kept', bag].filter(Boolean).join(' · '));
-    this.showEvents();
+  factsOf(trial) {
+    const { lost, nth, detailed, bag } = trial;
+    return [summaryOf(trial, this.app.store.now()), nth && `trial ${nth} of its program`,
+      lost && lostEvents(trial), !detailed && 'its events are no longer kept', bag]
+      .filter(Boolean).join(' · ');
   }
 
   showEvents() {
     const { trial, events } = this;
-    if (!trial || trial.id !== this.chosen || !this.isCurrent) return;
+    if (!trial || trial.id !== this.chosen) return;
     this.replay.root.hidden = !events.length;
     if (!events.length) return;
     this.log.show(() => this.events);
@@ -222,6 +209,4 @@ class TrialPanel {
     }
     return { graph: (path) => opened.graphs[path], images: opened.images };
   }
-
-  tick() { if (this.trial && !this.bag && isRunning(this.trial)) this.showFacts(this.trial); }
 }

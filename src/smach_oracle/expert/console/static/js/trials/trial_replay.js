@@ -1,9 +1,9 @@
 // @ts-check
 // One trial, to be replayed: a cursor on its time axis, the machine as it stood then, and what
 // happened in words.
-import { h, modified, options, replace, setText, typing } from '../page/dom.js';
+import { h, modified, setText, typing } from '../page/dom.js';
 import { added, chip } from '../page/format.js';
-import { redraw } from '../page/redraw.js';
+import { keep, render } from '../page/redraw.js';
 import { MachineView } from '../robots/machine_view.js';
 import { MachineHistory, activePath, machineStateOf } from './machine_history.js';
 import { ReplayControls } from './replay_controls.js';
@@ -42,15 +42,9 @@ export class TrialReplay {
     /** @type {machine.MachineSource} */
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
     this.view = new MachineView(source, (path) => this.open(path));
-    this.path = h('div', { class: 'chips replay-path', 'aria-label': 'What is active' });
     this.words = h('p', { class: 'replay-words', role: 'status' });
     this.question = new ReplayQuestion(app);
-    this.container = h('select', { class: 'replay-container', 'aria-label': 'Machine that is shown',
-      onchange: () => this.open(this.container.value) });
-    this.containersKey = '';
-    this.stage = h('div', { class: 'replay-stage' },
-      h('div', { class: 'row replay-head' }, this.path, h('span', { class: 'spacer' }),
-        this.container), this.view.root);
+    this.stage = h('div', {});
     this.root = h('div', { class: 'replay', onkeydown: (event) => this.keyOutside(event) },
       this.controls.root, this.timeline.root, this.words, this.question.root, this.stage);
   }
@@ -147,38 +141,33 @@ export class TrialReplay {
     const paths = [...new Set(events.map((each) => each.path))].filter(Boolean).sort();
     this.state = machineStateOf(now, paths, (path) => graph(path)?.oracle || 'ORACLE');
     const active = activePath(now);
-    this.showPath(active, now);
     this.question.show(now.question, (now.question && images[now.question.query]) || []);
     const deepest = active.length ? active[active.length - 1][0] : event.path;
     const usual = graph(deepest) || !graph(event.path) ? deepest : event.path;
     const shown = paths.includes(this.chosen) ? this.chosen : usual;
-    this.showContainers(paths, shown);
+    render(this.stage, this.stageView(active, now, paths, shown));
     this.view.show(ROBOT, shown);
   }
 
   /**
    * @param {[path: string, label: string][]} active
    * @param {replay.Snapshot} now
-   */
-  showPath(active, { failed }) {
-    redraw(this.path, active.length ? active.map(([path, label], index) => [
-      index > 0 && h('span', { class: 'dim' }, '›'),
-      chip(label, failed[path] ? 'bad' : 'accent', path + '/' + label),
-    ]) : h('span', { class: 'dim' }, 'Nothing is active.'));
-  }
-
-  /**
-   * @param {string[]} paths
+   * @param {string[]} paths of containers
    * @param {string} shown
    */
-  showContainers(paths, shown) {
-    const key = JSON.stringify([paths, this.chosen]);
-    if (key !== this.containersKey) {
-      this.containersKey = key;
-      replace(this.container, h('option', { value: '' }, FOLLOW), options(paths, this.chosen));
-      this.container.hidden = paths.length < 2;
-    }
-    this.container.title = shown;
+  stageView(active, { failed }, paths, shown) {
+    return h('div', { class: 'replay-stage' }, h('div', { class: 'row replay-head' },
+      h('div', { class: 'chips replay-path', 'aria-label': 'What is active' },
+        active.map(([path, label], index) => [index > 0 && h('span', { class: 'dim' }, '›'),
+          chip(label, failed[path] ? 'bad' : 'accent', path + '/' + label)]),
+        !active.length && h('span', { class: 'dim' }, 'Nothing is active.')),
+      h('span', { class: 'spacer' }),
+      h('select', { class: 'replay-container', 'aria-label': 'Machine that is shown',
+        title: shown, hidden: paths.length < 2, onchange: ({ target }) => {
+          if (target instanceof HTMLSelectElement) this.open(target.value);
+        } }, ['', ...paths].map((path) => h('option', { key: path, value: path,
+        selected: path === this.chosen }, path || FOLLOW)))),
+    keep(this.view.root));
   }
 
   /** @param {string} path of a container */
