@@ -3,7 +3,8 @@
 import os
 import sqlite3
 import time
-from typing import Callable
+import weakref
+from typing import Callable, Dict, Tuple
 from urllib.parse import quote
 
 from .accepting import prepare, put_in_doubt
@@ -20,9 +21,38 @@ from .tables import (
     try_to_write,
 )
 
+# stores that this process has open, by device and inode. Only SQLite looks at their files: where a
+# process closes a file, it loses all locks that it has on it (POSIX, fcntl), and another program
+# could then take the log away
+_open_here: Dict[Tuple[int, int], 'weakref.WeakSet[object]'] = {}
 # waits before a store that looks damaged is looked at again: a program that begins or ends changes
 # several files
 LOOKS_AGAIN_S = (0.05, 0.2)
+
+
+def note_open(where: str, store: object) -> None:
+    """Note that this process has the store at `where` open, as long as `store` lives."""
+    _open_here.setdefault(_file_of(where), weakref.WeakSet()).add(store)
+
+
+def note_closed(store: object) -> None:
+    """Note that this process has it open no more, in that `store`."""
+    for file, stores in list(_open_here.items()):
+        stores.discard(store)
+        if not stores:
+            _open_here.pop(file, None)
+
+
+def _file_of(where: str) -> Tuple[int, int]:
+    found = os.stat(where)
+    return found.st_dev, found.st_ino
+
+
+def _is_open_here(where: str) -> bool:
+    try:
+        return bool(_open_here.get(_file_of(where)))
+    except OSError:
+        return False
 
 
 class Opening:
@@ -54,11 +84,11 @@ class Opening:
             prepare(self._where, self.path)
             self.is_damaged = True
             return
-        if files.is_there:
-            return
-        if self.read_only:
-            raise StoreError('{}: there is no such store'.format(self.path))
-        make_store(self._where)
+        if not files.is_there:
+            if self.read_only:
+                raise StoreError('{}: there is no such store'.format(self.path))
+            make_store(self._where)
+        note_open(self._where, self)  # from before SQLite opens it, for another thread
 
     def _examined(self) -> Files:
         for waits_s in LOOKS_AGAIN_S:
@@ -69,6 +99,8 @@ class Opening:
         return self._checked()
 
     def _checked(self) -> Files:
+        if _is_open_here(self._where):
+            return Files(True)  # it was looked at before
         files = examined(self._where, self.path)
         if files.is_there:
             self._check_content(files)

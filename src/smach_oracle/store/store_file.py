@@ -15,7 +15,7 @@ from smach_oracle.forking import in_child
 
 from .errors import StoreDamaged, StoreError, told_error
 from .names import RENAMED
-from .opening import Opening
+from .opening import Opening, note_closed, note_open
 from .renaming import Renaming, containers_of, told_renaming
 from .rows import LogLine, NewMoment, StoredFact, StoredMoment, StoredTrial, StoredValue
 from .soundness import CLOSED, Content, Mark
@@ -60,6 +60,7 @@ class StoreFile:
         try:
             opening = Opening(path, where, read_only, accept_by, self._begin)
             self._db = opening.opened(synchronous)
+            note_open(where, self)
         except sqlite3.Error as err:
             raise told_error(path, err) from err
         except OSError as err:
@@ -70,6 +71,7 @@ class StoreFile:
     def _let_go(self) -> None:
         # Never close a parent's database, nor let it be freed: SQLite would take it for its own.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._db))
+        note_closed(self)  # the locks are the parent's
 
     def _begin(self, content: Content) -> None:
         self._has = content
@@ -85,6 +87,7 @@ class StoreFile:
                     self._note(log=CLOSED)
         self._mark.close()
         self._db.close()
+        note_closed(self)
 
     def _note(self, log: Optional[str] = None, **changed: int) -> None:
         """Mark what it has. Where another program has changed it, trials may have gone."""

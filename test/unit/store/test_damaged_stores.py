@@ -37,13 +37,14 @@ def write(path, name, synchronous, moments):
     trial = store.begin_trial(NewTrial('TASK', name, ('id', '{}'), 5.0))
     for seq in range(moments):
         store.add(trial, [moment(seq)])
+    return store  # freed, it would be closed
 
 
 def killed(path, name='abc', synchronous='FULL', moments=MOMENTS):
     """A store whose program was killed."""
     child = os.fork()
     if not child:
-        write(path, name, synchronous, moments)
+        _store = write(path, name, synchronous, moments)
         os.kill(os.getpid(), signal.SIGKILL)
     os.waitpid(child, 0)
     return path
@@ -372,7 +373,9 @@ def test_trials_that_are_removed_are_not_missed(tmp_path, way):
 def test_trials_that_another_program_removes_meanwhile_are_not_missed(tmp_path, then, is_killed):
     """Also where the last moments and trials were among them."""
     there = str(tmp_path / 'robot.db')
-    ended(StoreFile(there), 'first')
+    first = StoreFile(there)
+    ended(first, 'first')
+    first.close()
     child = os.fork()
     if not child:
         store = StoreFile(there)
@@ -395,6 +398,28 @@ def test_trials_that_another_program_removes_meanwhile_are_not_missed(tmp_path, 
     os.waitpid(child, 0)
     again = StoreFile(there)
     assert [each.trial_id for each in again.trials()][:1] == ['runs']
+    again.close()
+
+
+def test_a_program_that_opens_its_store_twice_keeps_its_log_from_other_programs(tmp_path):
+    """Such as one with two machines. Where it closes a file, it loses its locks on that."""
+    there = str(tmp_path / 'robot.db')
+    code = 'import sys\nfrom smach_oracle.store.store_file import StoreFile\n'
+    other = [sys.executable, '-c', code + 'StoreFile(sys.argv[1]).close()', there]
+    child = os.fork()
+    if not child:
+        first, second = StoreFile(there), StoreFile(there)
+        trial = first.begin_trial(NewTrial('TASK', 'runs', ('id', '{}'), 5.0))
+        subprocess.run(other)
+        first.add(trial, [moment(0)])
+        second.close()
+        subprocess.run(other)
+        first.add(trial, [moment(1)])
+        os.kill(os.getpid(), signal.SIGKILL)
+    os.waitpid(child, 0)
+    again = StoreFile(there)
+    (trial,) = again.trials()
+    assert len(again.moments(trial.number)) == 2
     again.close()
 
 
