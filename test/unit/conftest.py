@@ -35,7 +35,7 @@ def what_may_lack(text):
 def pytest_make_collect_report(collector):
     """Leave out a file that imports what another Python cannot have (scripts/test --python)."""
     report = (yield).get_result()
-    leave_out(report, str(collector.path), str(report.longrepr))
+    leave_out(report, str(collector.fspath), str(report.longrepr))
 
 
 @pytest.hookimpl(hookwrapper=True)
@@ -43,7 +43,7 @@ def pytest_runtest_makereport(item, call):
     """Leave out a test for the same reason, also where a command that it runs says so."""
     report = (yield).get_result()
     if call.excinfo is not None:
-        leave_out(report, str(item.path), told_by(call.excinfo.value, report))
+        leave_out(report, str(item.fspath), told_by(call.excinfo.value, report))
 
 
 def told_by(error, report):

@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import os
 import random
 import subprocess
 import sys
@@ -103,6 +104,18 @@ def test_what_is_listed_as_equivalent_is_a_mutant_and_has_a_reason():
     with EQUIVALENT.open(newline='', encoding='utf-8') as file:
         assert [row for row in csv.DictReader(file) if not row['reason'].strip()] == []
     assert equivalents() - {change_of(mutant) for mutant in EXECUTIVE.mutants()} == set()
+
+
+def test_tests_of_the_executive_load_from_a_copy_of_the_tree_without_built_messages():
+    sources = os.pathsep.join([str(ROOT / 'src'), os.environ.get('PYTHONPATH', '')])
+    loaded = subprocess.run(
+        [sys.executable, '-m', 'pytest', '--collect-only', '-q', EXECUTIVE.tests],
+        cwd=str(ROOT),
+        env=dict(os.environ, PYTHONPATH=sources),
+        stdout=subprocess.PIPE,
+        universal_newlines=True,
+    )
+    assert not loaded.returncode, loaded.stdout[-2000:]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from typing import Any, Dict, FrozenSet, NamedTuple, Optional
 
-from borders.settings import BY_NAME
+from borders.setting_values import BY_NAME
 from hypothesis import strategies as st
 
 from smach_oracle.oracle.errors import SettingsError
