@@ -18,14 +18,14 @@ import sys
 import time
 from typing import Dict, Iterator, List
 
-from quiet import silence
+from quiet import in_bare_steps, silence
 
 import smach
 from smach_oracle.oracle import OracleContainer
 
 # in bare steps. The aims are missed, by 2 and by 3. The limits are what is reached and a fifth.
-AIM, LIMIT = 10.0, 14.4
-OBSERVED_AIM, OBSERVED_LIMIT = 40.0, 51.0
+AIM, LIMIT = 10.0, in_bare_steps(14.4)
+OBSERVED_AIM, OBSERVED_LIMIT = 40.0, in_bare_steps(51.0)
 DEPTH = 3
 WINDOW = 50  # steps
 

@@ -1,6 +1,16 @@
-"""SMACH without its log, for benchmarks of what a machine costs or does."""
+"""For benchmarks of what a machine costs or does: SMACH without its log, and limits."""
 
+import sys
 from typing import Any
+
+# CPython 3.13 makes the bare loop faster (34 ns, 40 ns with 3.11) and the steps of a machine not:
+# the engine's ratio went from 10.9 to 12.5, that of a wrapped step from 12.0 to 15.0
+SLOWER_BY = 1.25 if sys.version_info >= (3, 13) else 1.0
+
+
+def in_bare_steps(limit: float) -> float:
+    """Return a limit in steps of the bare loop, measured with CPython 3.11, for this Python."""
+    return limit * SLOWER_BY
 
 
 def silence() -> Any:

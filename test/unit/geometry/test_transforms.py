@@ -1,0 +1,22 @@
+"""Poses: what becomes of numbers that are none."""
+
+import numpy as np
+import pytest
+
+from smach_oracle.geometry.transforms import from_rpy, quaternion
+
+
+def test_a_rotation_has_its_quaternion():
+    half = np.sin(np.pi / 4)
+    assert quaternion(from_rpy((1.0, 2.0, 3.0), yaw=np.pi / 2)) == pytest.approx([0, 0, half, half])
+
+
+@pytest.mark.parametrize('odd', [np.nan, np.inf])
+def test_that_of_no_rotation_has_no_numbers_and_raises_nothing(odd):
+    """A pose that is told must not end who tells it, whichever SciPy there is."""
+    matrix = np.eye(4)
+    matrix[0, 1] = odd
+    assert np.isnan(quaternion(matrix)).all()
+    matrix = np.eye(4)
+    matrix[0, 3] = odd  # the place alone
+    assert quaternion(matrix) == pytest.approx([0, 0, 0, 1])
