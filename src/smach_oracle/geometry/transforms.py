@@ -48,7 +48,7 @@ def from_quaternion(position: VectorLike, xyzw: VectorLike) -> np.ndarray:
 
 
 def quaternion(matrix: np.ndarray) -> np.ndarray:
-    """(x, y, z, w) of the rotation of a 4x4 or 3x3, no numbers where that has one that is none."""
+    """(x, y, z, w) of the rotation of a 4x4 or 3x3, NaN where that is not finite."""
     if not np.isfinite(matrix[:3, :3]).all():
         return np.full(4, np.nan)  # newer SciPy raises (1.15 does, 1.10 does not)
     return Rotation.from_matrix(matrix[:3, :3]).as_quat()

@@ -1,4 +1,4 @@
-"""Poses: what becomes of numbers that are none."""
+"""Poses that are not finite are told without an error."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ def test_a_rotation_has_its_quaternion():
 
 
 @pytest.mark.parametrize('odd', [np.nan, np.inf])
-def test_that_of_no_rotation_has_no_numbers_and_raises_nothing(odd):
+def test_where_the_rotation_is_not_finite_it_is_nan_and_nothing_is_raised(odd):
     """A pose that is told must not end who tells it, whichever SciPy there is."""
     matrix = np.eye(4)
     matrix[0, 1] = odd
