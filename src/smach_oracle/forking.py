@@ -22,7 +22,7 @@ Decision = Callable[[], None]
 
 _of_functions: List[Decision] = []
 # by the id of the owner and the name of its method: an owner that is gone needs no decision
-_of_objects: Dict[Tuple[int, str], 'weakref.ref[object]'] = {}
+_of_objects: Dict[Tuple[int, str], Tuple['weakref.ref[object]', Callable[[Any], None]]] = {}
 _masks: Dict[int, Set[int]] = {}  # of threads that fork now, as they were before
 _forked = False
 
@@ -38,12 +38,12 @@ def in_child(decision: Decision) -> None:
         return
     key = id(decision.__self__), decision.__name__
 
-    # the default is there when the process ends too, the module's own name is not
+    # at exit the names of the module may be gone, a default argument is not
     def forget(gone: object, kept: Dict[Tuple[int, str], Any] = _of_objects) -> None:
-        if kept.get(key) is gone:
+        if key in kept and kept[key][0] is gone:
             del kept[key]
 
-    _of_objects[key] = weakref.ref(decision.__self__, forget)
+    _of_objects[key] = weakref.ref(decision.__self__, forget), decision.__func__
 
 
 def is_child() -> bool:
@@ -89,8 +89,8 @@ def _decide() -> None:
     _forked = True
     mask = _masks.pop(threading.get_ident())
     _masks.clear()
-    owners = [(owner(), name) for (_, name), owner in list(_of_objects.items())]
-    methods = [getattr(owner, name) for owner, name in owners if owner is not None]
+    owned = [(owner(), function) for owner, function in list(_of_objects.values())]
+    methods = [MethodType(function, owner) for owner, function in owned if owner is not None]
     for decision in _of_functions + methods:
         try:
             decision()

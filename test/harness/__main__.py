@@ -81,7 +81,7 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument(
         '--jobs',
         type=int,
-        help="checks at a time (default: {}, benchmarks of the wall's time 1)".format(len(WORKERS)),
+        help='checks at a time (default: {}, benchmarks of wall-clock time 1)'.format(len(WORKERS)),
     )
     parser.add_argument(
         '--upstream',

@@ -17,7 +17,7 @@ from typing import Dict, List, NamedTuple, Optional
 MARK = 'SMACH_ORACLE_CHECK'
 # roslaunch alone would wait 15 s for a node that does not listen
 STOP_GRACE_S = 5.0
-# the nice value of a command that gives way: it gets a quarter of a core beside another
+# by which a command that gives way is nicer: it gets a quarter of a core beside another
 NICE = 5
 
 
@@ -100,9 +100,10 @@ def _give_way(pid: int) -> None:
     system can.
     """
     try:
-        os.setpriority(os.PRIO_PROCESS, pid, NICE)
+        nice = min(19, os.getpriority(os.PRIO_PROCESS, 0) + NICE)
+        os.setpriority(os.PRIO_PROCESS, pid, nice)
         # where the system shares its time by sessions first, a nice value counts within one alone
-        Path('/proc', str(pid), 'autogroup').write_text(str(NICE), encoding='ascii')
+        Path('/proc', str(pid), 'autogroup').write_text(str(nice), encoding='ascii')
     except OSError:
         pass  # it has ended, or time is not shared so here
 

@@ -1,9 +1,9 @@
 """Which checks run side by side, and in which order.
 
 Rostests wait most of their time: for nodes that start, for time to pass, for masters that come
-back. All others compute. Three that wait run beside two that compute. Those give way
-(`processes.NICE`), so that a rostest finds the machine as if it were idle, and no core is.
-Benchmarks of the wall's time run alone, at the end.
+back. All others compute. Three that wait run beside two that compute. Tests and linters that
+compute give way (`processes.NICE`), so that a rostest finds the machine almost idle, and no core
+is ever idle. Benchmarks of wall-clock time run alone, at the end.
 """
 
 import sys
@@ -19,8 +19,8 @@ COMPUTES, WAITS, ALONE = 'computes', 'waits', 'alone'
 # side at most
 WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES), (COMPUTES, WAITS), (WAITS,), (WAITS,))
 MORE = (WAITS, COMPUTES)
-# benchmarks that need no machine of their own: they count faults, memory or processor time. Most of
-# the last hold it against a yardstick of the same run, of which the best or median round counts
+# benchmarks that need no machine of their own: they count faults or memory, take processor time, or
+# hold the best of many rounds against a yardstick of the same run
 BESIDE_OTHERS = tuple(
     'benchmarks/' + name
     for name in (

@@ -59,11 +59,10 @@ class Robot:
         ):
             rospy.Subscriber(topic, kind, take, queue_size=200, tcp_nodelay=True)
 
-    def pose(self, frame):
-        """4x4, the base from a frame, by TF."""
-        found = self._buffer.lookup_transform(
-            BASE, frame, rospy.Time(), rospy.Duration(20)
-        ).transform
+    def pose(self, frame, at=None):
+        """4x4, the base from a frame, by TF, by default the latest one."""
+        when = rospy.Time() if at is None else at
+        found = self._buffer.lookup_transform(BASE, frame, when, rospy.Duration(20)).transform
         at, turn = found.translation, found.rotation
         return from_quaternion((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
 
@@ -158,14 +157,15 @@ class Drive(unittest.TestCase):
         return wait_for(lambda: np.linalg.norm((self.robot.pose(TOOLS[side]) - begin)[:3, 3]) > way)
 
     def stands(self, side):
-        """Wait until the arm does; its tool's pose."""
+        """Wait until the arm does; its tool's pose then. What is told may come late."""
         now = rospy.Time.now().to_sec()
-        self.assertTrue(
-            wait_for(
-                lambda: rospy.Time.now().to_sec() - max(now, self.robot.moved_last(side, now)) > 0.3
-            )
-        )
-        return self.robot.pose(TOOLS[side])
+
+        def told_since():
+            told = self.robot.joints[-1].header.stamp.to_sec()
+            return told - max(now, self.robot.moved_last(side, now))
+
+        self.assertTrue(wait_for(lambda: told_since() > 0.3))
+        return self.robot.pose(TOOLS[side], self.robot.joints[-1].header.stamp)
 
     def drive(self, key, side='right'):
         """Hold a key until the hand has gone 3 cm; the way (m) that it went, (3,)."""

@@ -49,8 +49,8 @@ def from_quaternion(position: VectorLike, xyzw: VectorLike) -> np.ndarray:
 
 def quaternion(matrix: np.ndarray) -> np.ndarray:
     """(x, y, z, w) of the rotation of a 4x4 or 3x3, NaN where that is not finite."""
-    if not np.isfinite(matrix[:3, :3]).all():
-        return np.full(4, np.nan)  # newer SciPy raises (1.15 does, 1.10 does not)
+    if not _is_finite(matrix):
+        return np.full(4, np.nan)
     return Rotation.from_matrix(matrix[:3, :3]).as_quat()
 
 
@@ -66,8 +66,15 @@ def apply(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 
 def rotation_vector(matrix: np.ndarray) -> np.ndarray:
-    """Axis times angle (3,), rad, of the rotation of a 4x4 or 3x3."""
+    """Axis times angle (3,), rad, of the rotation of a 4x4 or 3x3, NaN where that is not finite."""
+    if not _is_finite(matrix):
+        return np.full(3, np.nan)
     return Rotation.from_matrix(matrix[:3, :3]).as_rotvec()
+
+
+def _is_finite(matrix: np.ndarray) -> bool:
+    """Whether it is a rotation to SciPy, which raises else (1.15 does, 1.10 does not)."""
+    return bool(np.isfinite(matrix[:3, :3]).all())
 
 
 def skew(vector: np.ndarray) -> np.ndarray:

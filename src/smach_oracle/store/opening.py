@@ -2,10 +2,13 @@
 
 import os
 import sqlite3
+import threading
 import time
 import weakref
 from typing import Callable, Dict, Tuple
 from urllib.parse import quote
+
+from smach_oracle.forking import in_child
 
 from .accepting import prepare, put_in_doubt
 from .errors import StoreDamaged, StoreError
@@ -30,17 +33,28 @@ _open_here: Dict[Tuple[int, int], 'weakref.WeakSet[object]'] = {}
 LOOKS_AGAIN_S = (0.05, 0.2)
 
 
+_looking = threading.Lock()  # held from the look at the files until the store is noted
+
+
+def _forget() -> None:
+    """Begin as a child process: what is open, and whoever looks, is the parent's."""
+    global _looking
+    _looking = threading.Lock()
+    _open_here.clear()
+
+
+in_child(_forget)
+
+
 def note_open(where: str, store: object) -> None:
     """Note that this process has the store at `where` open, as long as `store` lives."""
     _open_here.setdefault(_file_of(where), weakref.WeakSet()).add(store)
 
 
 def note_closed(store: object) -> None:
-    """Note that this process has it open no more, in that `store`."""
-    for file, stores in list(_open_here.items()):
+    """Note that `store` is closed."""
+    for stores in list(_open_here.values()):  # none is removed: another thread may fill it now
         stores.discard(store)
-        if not stores:
-            _open_here.pop(file, None)
 
 
 def _file_of(where: str) -> Tuple[int, int]:
@@ -76,19 +90,20 @@ class Opening:
         :raises StoreError: for no store.
         :raises StoreDamaged: for one that has lost some of it.
         """
-        try:
-            files = self._examined()
-        except StoreDamaged:
-            if not self._accepts:
-                raise
-            prepare(self._where, self.path)
-            self.is_damaged = True
-            return
-        if not files.is_there:
-            if self.read_only:
-                raise StoreError('{}: there is no such store'.format(self.path))
-            make_store(self._where)
-        note_open(self._where, self)  # from before SQLite opens it, for another thread
+        with _looking:
+            try:
+                files = self._examined()
+            except StoreDamaged:
+                if not self._accepts:
+                    raise
+                prepare(self._where, self.path)
+                self.is_damaged = True
+                return
+            if not files.is_there:
+                if self.read_only:
+                    raise StoreError('{}: there is no such store'.format(self.path))
+                make_store(self._where)
+            note_open(self._where, self)  # from before SQLite opens it, for another thread
 
     def _examined(self) -> Files:
         for waits_s in LOOKS_AGAIN_S:

@@ -71,7 +71,6 @@ class StoreFile:
     def _let_go(self) -> None:
         # Never close a parent's database, nor let it be freed: SQLite would take it for its own.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(self._db))
-        note_closed(self)  # the locks are the parent's
 
     def _begin(self, content: Content) -> None:
         self._has = content

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from smach_oracle.geometry.transforms import from_rpy, quaternion
+from smach_oracle.geometry.transforms import from_rpy, quaternion, rotation_vector
 
 
 def test_a_rotation_has_its_quaternion():
@@ -16,7 +16,7 @@ def test_where_the_rotation_is_not_finite_it_is_nan_and_nothing_is_raised(odd):
     """A pose that is told must not end who tells it, whichever SciPy there is."""
     matrix = np.eye(4)
     matrix[0, 1] = odd
-    assert np.isnan(quaternion(matrix)).all()
+    assert np.isnan(quaternion(matrix)).all() and np.isnan(rotation_vector(matrix)).all()
     matrix = np.eye(4)
     matrix[0, 3] = odd  # the place alone
     assert quaternion(matrix) == pytest.approx([0, 0, 0, 1])

@@ -70,7 +70,7 @@ def shown(path: Path) -> str:
 def parse(path: Path) -> ast.Module:
     """The syntax tree of `path`, as Python 3.8 reads it; read once, so not to be changed."""
     tree = ast.parse(path.read_text(encoding='utf-8'), shown(path), feature_version=(3, 8))
-    gc.freeze()  # the trees stay: a collection would go through them all and find nothing
+    gc.freeze()  # the trees stay, and so does most of what is there: no collection looks at it
     return tree
 
 

@@ -162,7 +162,8 @@ print(time.monotonic() < end)
 
 
 def test_what_computes_gives_way_and_a_rostest_does_not(bench, monkeypatch):
-    command = [sys.executable, '-c', SHARE.format(processes.NICE)]
+    nice = min(19, os.getpriority(os.PRIO_PROCESS, 0) + processes.NICE)
+    command = [sys.executable, '-c', SHARE.format(nice)]
     bench.run('giving', command, 30.0, gives_way=True)
     assert (bench.results / 'log/giving.log').read_text() == 'True\n'
     given = {}

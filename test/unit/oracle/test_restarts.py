@@ -198,3 +198,11 @@ def test_a_machine_that_was_copied_has_begun_no_trial():
     twin = copy.deepcopy(machine.machine)
     assert machine.machine._oracle.tree.restarts.count == 2
     assert twin._oracle.tree.restarts.count == 0
+
+
+def test_a_copy_numbers_its_visits_from_one():
+    """Python 3.14 copies no counter of itertools."""
+    machine = failing()
+    machine.run()
+    machine.machine._oracle.tree.next_visit()
+    assert copy.deepcopy(machine.machine)._oracle.tree.next_visit() == 1

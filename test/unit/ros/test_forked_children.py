@@ -272,6 +272,43 @@ def begin():
         program.wait(30)
 
 
+OWNERS = """
+import os
+import sys
+
+from smach_oracle.forking import in_child
+
+
+class Part:
+    def _let_go(self):
+        print('let go', flush=True)
+
+    def _fail(self):
+        raise ValueError('this one cannot')
+
+
+kept, freed, odd = Part(), Part(), Part()
+for decision in (odd._fail, kept._let_go, freed._let_go):
+    in_child(decision)
+kept.itself = kept  # freed as the process ends, after the module's names
+del freed, decision
+child = os.fork()
+if child:
+    os.waitpid(child, 0)
+"""
+
+
+def test_each_part_that_lives_lets_go_once_and_the_end_of_the_process_says_nothing():
+    ended = subprocess.run(
+        [sys.executable, '-c', OWNERS],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        universal_newlines=True,
+    )
+    assert (ended.stdout, ended.returncode) == ('let go\n', 0)
+    assert 'this one cannot' in ended.stderr and ended.stderr.count('Traceback') == 1
+
+
 def living(session):
     """The processes of a session that have not ended."""
     found = set()

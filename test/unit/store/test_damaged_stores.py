@@ -408,15 +408,18 @@ def test_a_program_that_opens_its_store_twice_keeps_its_log_from_other_programs(
     other = [sys.executable, '-c', code + 'StoreFile(sys.argv[1]).close()', there]
     child = os.fork()
     if not child:
-        first, second = StoreFile(there), StoreFile(there)
-        trial = first.begin_trial(NewTrial('TASK', 'runs', ('id', '{}'), 5.0))
-        subprocess.run(other)
-        first.add(trial, [moment(0)])
-        second.close()
-        subprocess.run(other)
-        first.add(trial, [moment(1)])
-        os.kill(os.getpid(), signal.SIGKILL)
-    os.waitpid(child, 0)
+        try:
+            first, second = StoreFile(there), StoreFile(there)
+            trial = first.begin_trial(NewTrial('TASK', 'runs', ('id', '{}'), 5.0))
+            subprocess.run(other, check=True)
+            first.add(trial, [moment(0)])
+            second.close()
+            subprocess.run(other, check=True)
+            first.add(trial, [moment(1)])
+            os.kill(os.getpid(), signal.SIGKILL)
+        finally:
+            os._exit(1)
+    assert os.waitpid(child, 0)[1] == signal.SIGKILL
     again = StoreFile(there)
     (trial,) = again.trials()
     assert len(again.moments(trial.number)) == 2

@@ -97,7 +97,7 @@ class ContainerRecords:
     def make(self, label: str, settings: StateSettings, special: bool) -> StateRecord:
         """Make the record of a state, with what a rates file says of it.
 
-        Another thread, which reads rates, may make it meanwhile. Then that one holds.
+        Another thread, which reads rates, may make it meanwhile. The first one is kept.
         """
         record = StateRecord(label, settings, special)
         learned = self.to_come.get(label)
@@ -105,7 +105,10 @@ class ContainerRecords:
             record.restore(learned)
             record.shared = base_of(learned)
         record = self.by_label.setdefault(label, record)
-        self.to_come.pop(label, None)
+        late = self.to_come.pop(label, None)
+        if late is not None and late is not learned:  # a file was read meanwhile
+            record.restore(late)
+            record.shared = base_of(late)
         return record
 
     def learned(self) -> Dict[str, object]:

@@ -12,7 +12,7 @@ const drawn = new WeakMap(); // of what
 /** @type {WeakMap<Node, HTMLElement>} */
 const kept = new WeakMap(); // by what stands for it in a view
 /** @type {WeakSet<Node>} */
-const own = new WeakSet(); // those that are kept: no other one becomes like them, nor they like it
+const own = new WeakSet(); // those that are kept: never matched with another element
 /** @type {Map<Element, () => void>} */
 const waiting = new Map(); // by element, its newest change
 /** @type {Element | null} */

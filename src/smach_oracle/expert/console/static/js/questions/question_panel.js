@@ -6,7 +6,7 @@ import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, typing } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { counted } from '../page/format.js';
-import { keep, redraw, render } from '../page/redraw.js';
+import { keep, redraw, render, whenLetGo } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { AlikeAnswer } from './alike_answer.js';
@@ -248,8 +248,11 @@ class QuestionPanel {
   showStage() {
     const { detail, stage } = this;
     this.root.classList.toggle('working', Boolean(detail));
-    if (!detail) redraw(stage, this.emptyStage());
-    else if (detail.root.parentElement !== stage) {
+    if (!detail) {
+      whenLetGo(stage, () => { // a question may be open by then
+        if (!this.detail) redraw(stage, this.emptyStage());
+      });
+    } else if (detail.root.parentElement !== stage) {
       replace(stage, detail.root);
       stage.scrollTop = 0;
     }

@@ -7,7 +7,7 @@ import { isOracle, listed, resumable, running, waiting } from './hand_words.js';
  *   | 'gone'} Standing */
 /** @typedef {{ state: string, path: string, rate: number | null }} ActivePlace */
 /** @typedef {Pick<server.Question, 'key' | 'state' | 'stands' | 'asked' | 'rate' | 'holder'
- *   | 'interface'>} Asked what a card says of a question: few words, to be compared soon */
+ *   | 'interface'>} Asked what a card says of a question: few words, which are compared quickly */
 /**
  * @typedef {object} RobotFacts
  * @property {string} robot

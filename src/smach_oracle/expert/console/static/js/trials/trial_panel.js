@@ -150,7 +150,7 @@ class TrialPanel {
     h('div', { class: 'bag-notes', hidden: !notes.length }, notes),
     h('div', { class: 'trial-body' }, keep(this.list.root),
       h('section', { class: 'card trial-detail' },
-        h('div', {}, h('h2', {}, trial?.experiment, ' · ', trial && clock(trial.start)),
+        h('div', {}, h('h2', {}, trial && `${trial.experiment} · ${clock(trial.start)}`),
           h('p', { class: 'dim' }, trial && this.factsOf(trial)),
           h('p', { class: 'problem', role: 'alert' }, this.bag && recorded.problem)),
         keep(this.replay.root)))];
