@@ -237,7 +237,8 @@ class Marking(ConsolePage, unittest.TestCase):
         self.assert_accessible('joints')
         browser.click('[data-topic="/points"]')
         self.assertTrue(browser.says('20000 of 50000 points', '.cloud-view'))
-        self.assertGreater(browser.run(PICTURE, '.cloud-view .cloud')[1], 1000)
+        # it is drawn with the next frame of the browser
+        self.assertTrue(wait_for(lambda: browser.run(PICTURE, '.cloud-view .cloud')[1] > 1000))
         self.assertEqual(browser.errors(), [])
 
     def test_5_the_robot_stands_in_its_cloud_and_moves_as_its_joints_say(self):
