@@ -53,8 +53,14 @@ export interface Reply<Name extends keyof Commands = keyof Commands> {
 }
 export interface ReplyData { hello: HelloData; mark: Marked; take_wheel: WheelData }
 """
-PLAIN = {'str': 'string', 'int': 'number', 'float': 'number', 'bool': 'boolean', 'None': 'null'}
-PLAIN['object'] = 'unknown'  # plain data of any kind
+PLAIN = {
+    'str': 'string',
+    'int': 'number',
+    'float': 'number',
+    'bool': 'boolean',
+    'None': 'null',
+    'object': 'unknown',  # plain data of any kind
+}
 
 
 def words(values: Iterable[object]) -> str:

@@ -2,8 +2,6 @@
 // Long lists, of which the server sends what has changed to pages that look at them.
 import { unlessLost } from './connection.js';
 
-/** @typedef {'trials' | 'people' | ''} Place what lists belong to */
-
 /**
  * The rows of a list after a change.
  * @template {{ id: string }} Row
@@ -29,12 +27,12 @@ export function changed(old, { all, rows, gone = [] }) {
 export class Looking {
   /**
    * @param {page.Connection} connection
-   * @param {() => Place} wanted where what is shown has lists
+   * @param {() => server.LookedAt} wanted where what is shown has lists
    */
   constructor(connection, wanted) {
     this.connection = connection;
     this.wanted = wanted;
-    /** @type {Place} */
+    /** @type {server.LookedAt} */
     this.told = '';
     document.addEventListener('visibilitychange', () => this.tell());
   }
