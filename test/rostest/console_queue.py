@@ -52,6 +52,48 @@ import("/static/js/questions/queue_wishes.js").then(({ wanted, grouped, advice, 
   done([orders, groups, advised, [causeOf("Traceback:\\n  line 1\\nKeyError: x\\n"), causeOf("")]]);
 });"""
 
+# in the list of two made-up questions: the cards that change as the same two are told again, and
+# as the second one is claimed; then how the times of the first one have passed without a drawing
+DRAWN = """
+const done = arguments[arguments.length - 1];
+const paths = ["questions/question_panel.js", "page/store.js", "page/liveness.js",
+  "page/format.js"];
+Promise.all(paths.map((path) => import("/static/js/" + path))).then((
+  [{ questions }, { Store }, { Liveness }, { letTimePass }]) => {
+  const store = new Store();
+  const it = (robot) => ({ key: "s " + robot, server: "s", robot, path: "T", state: "S", what: "",
+    text: "", class: 1, rate: 0.5, continuous: false, status: "pending", holder: "", idle: 0,
+    interface: "", asked: 10, deadline: 100, outcome: "", choices: [] });
+  const open = [it("/r1"), it("/r2")];
+  const app = { store, expert: "ann", mayAnswer: true, current: "", isMine: () => false,
+    connection: { connected: true, browser: "b" }, liveness: new Liveness(store), went() {} };
+  const panel = questions.create(app);
+  const list = panel.root.querySelector(".queue");
+  const seen = new MutationObserver(() => {});
+  const all = { attributes: true, characterData: true, childList: true, subtree: true };
+  seen.observe(list, all);
+  const give = (now) => {
+    store.receive({ now, sections: { questions: structuredClone(open) } });
+    panel.draw();
+  };
+  const changes = () => [...new Set(seen.takeRecords().map(({ target }) => (
+    (target instanceof Element ? target : target.parentElement).closest("[data-key]")
+  )).map((card) => card && card.dataset.key))];
+  give(20);
+  const drawn = [changes().length > 0];
+  give(20);
+  drawn.push(changes());
+  open[1].status = "claimed";
+  open[1].holder = "bob";
+  give(20);
+  drawn.push(changes());
+  letTimePass(list, 95);
+  drawn.push(list.querySelector(".times").textContent);
+  give(95);
+  drawn.push(list.querySelector(".left").className);
+  done(drawn);
+});"""
+
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Queue(ConsolePage, unittest.TestCase):
@@ -225,6 +267,12 @@ class Queue(ConsolePage, unittest.TestCase):
         self.assertEqual(groups, [['a', 'c'], ['b'], ['d']])
         self.assertEqual(advised, ['R because', 'H ', None])
         self.assertEqual(causes, ['KeyError: x', ''])
+
+    def test_7_a_card_is_drawn_again_only_where_something_about_its_question_is_other(self):
+        self.assertEqual(
+            self.browser.driver.execute_async_script(DRAWN),
+            [True, [], ['s /r2'], 'waits 1:25 min5 s left', 'left urgent'],
+        )
 
 
 if __name__ == '__main__':

@@ -5,7 +5,7 @@ import { Alerts } from './alerts.js';
 import { Connection } from './connection.js';
 import { watchOverClicks } from './deliberate.js';
 import { h, part, replace, setText, toast } from './dom.js';
-import { duration } from './format.js';
+import { letTimePass } from './format.js';
 import { Gate } from './gate.js';
 import { Liveness, aged } from './liveness.js';
 import { leaveNote, remember, remembered, takeNote } from './preferences.js';
@@ -160,9 +160,7 @@ export class App {
     if (this.connection.connected && this.liveness.console > RECONNECT_AFTER_S) {
       this.connection.connect();
     }
-    for (const shown of part('main').querySelectorAll('[data-since]')) {
-      setText(shown, duration(this.store.now() - Number(shown.getAttribute('data-since'))));
-    }
+    letTimePass(part('main'), this.store.now());
     this.tabNow.view.draw();
   }
 

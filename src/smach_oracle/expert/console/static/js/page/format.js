@@ -1,6 +1,6 @@
 // @ts-check
 // Numbers and names as people read them.
-import { h } from './dom.js';
+import { h, setText } from './dom.js';
 
 /** @type {{ [rank in server.FailureClass]: string }} */
 export const FAILURE_CLASSES = { 0: '', 1: 'low', 2: 'moderate', 3: 'high' };
@@ -23,6 +23,26 @@ export function duration(seconds) {
  * @param {number} now by the server's clock
  */
 export function since(at, now) { return h('span', { 'data-since': at }, duration(now - at)); }
+
+/**
+ * How long it is until something. The frame lets it shrink.
+ * @param {number} at s since the epoch
+ * @param {number} now by the server's clock
+ */
+export function until(at, now) { return h('span', { 'data-until': at }, duration(at - now)); }
+
+/**
+ * Time has passed for all that says how long.
+ * @param {HTMLElement} root
+ * @param {number} now by the server's clock
+ */
+export function letTimePass(root, now) {
+  for (const shown of root.querySelectorAll('[data-since], [data-until]')) {
+    const begun = shown.getAttribute('data-since');
+    setText(shown, duration(begun === null ? Number(shown.getAttribute('data-until')) - now
+      : now - Number(begun)));
+  }
+}
 
 /** @param {number} number */
 function twoDigits(number) { return String(number).padStart(2, '0'); }

@@ -1,7 +1,7 @@
 // @ts-check
 // Lists that change in place. What is pressed stays under the pointer until it is let go: around it
 // nothing comes or goes meanwhile, so that a click that has begun is not lost, nor lands elsewhere.
-import { keyOf, listenAs, nodesOf } from './dom.js';
+import { h, keyOf, listenAs, nodesOf } from './dom.js';
 
 const CLICK_MS = 100; // by then the click of what was let go has come
 const PRESSED = 'button, summary, [role="button"], .mark, .event';
@@ -102,13 +102,42 @@ export function redrawWith(element, data, childrenOf) {
 }
 
 /**
- * The same of a view: for one of many.
+ * The same of a view.
  * @param {HTMLElement} element
  * @param {unknown} data
  * @param {() => HTMLElement} viewOf
  */
 export function renderWith(element, data, viewOf) {
   if (isOther(element, data)) render(element, viewOf());
+}
+
+/** An element for each of many things, which changes only where something about that one does. */
+export class Cards {
+  /** @param {'section' | 'button'} tag */
+  constructor(tag) {
+    this.tag = tag;
+    /** @type {Map<string, HTMLElement>} */
+    this.known = new Map(); // by key
+  }
+
+  /**
+   * What stands for one in a view.
+   * @param {string} key
+   * @param {unknown} data
+   * @param {() => HTMLElement} viewOf
+   */
+  card(key, data, viewOf) {
+    const card = this.known.get(key) || h(this.tag, {});
+    this.known.set(key, card);
+    renderWith(card, data, viewOf);
+    return keep(card);
+  }
+
+  /** @param {string[]} keys of those that there still are */
+  only(keys) {
+    const there = new Set(keys);
+    for (const key of this.known.keys()) if (!there.has(key)) this.known.delete(key);
+  }
 }
 
 /**

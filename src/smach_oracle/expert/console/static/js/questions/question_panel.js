@@ -6,7 +6,7 @@ import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { h, modified, replace, typing } from '../page/dom.js';
 import { focusIsFree, moveFocus } from '../page/focus.js';
 import { counted } from '../page/format.js';
-import { keep, redraw, render, whenLetGo } from '../page/redraw.js';
+import { Cards, keep, redraw, render, whenLetGo } from '../page/redraw.js';
 import { SettledKey } from '../page/settled_keys.js';
 import { keysOn, turnedOff } from '../page/shortcuts.js';
 import { AlikeAnswer } from './alike_answer.js';
@@ -43,6 +43,7 @@ class QuestionPanel {
     this.missing = ''; // the question of an address, where it is not open
     this.tools = new QueueTools(() => this.showQueue());
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
+    this.cards = new Cards('button');
     this.side = h('aside', {});
     this.stage = h('div', { class: 'stage' });
     this.root = h('div', { class: 'panel questions' }, this.side, this.stage);
@@ -148,7 +149,7 @@ class QuestionPanel {
       keys.splice(at, 0, chosen);
     }
     this.order = keys;
-    redraw(this.queue, groups.length ? queueList(app, groups, this.ways)
+    redraw(this.queue, groups.length ? queueList(app, this.cards, groups, this.ways)
       : h('p', { class: 'empty' }, open.length ? [counted(open.length, 'open question'),
         ', none of which is wanted. ', h('button', { class: 'inline', 'data-action': 'show-all',
           onclick: () => this.showAll() }, 'Show all')] : 'No open questions.'));

@@ -4,7 +4,7 @@ import { waits } from '../page/alerts.js';
 import { wasMeant } from '../page/deliberate.js';
 import { h } from '../page/dom.js';
 import {
-  FAILURE_CLASSES, breakable, chip, counted, duration, percent, rateBar, robotMark,
+  FAILURE_CLASSES, breakable, chip, counted, percent, rateBar, robotMark, since, until,
 } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
 import { readersOf } from './onlookers.js';
@@ -14,6 +14,7 @@ import { FILTERS, ORDERS, advice, causeOf, grouped, wanted } from './queue_wishe
 /** @typedef {import('./queue_wishes.js').Group} Group */
 /** @typedef {import('./queue_wishes.js').Order} Order */
 /** @typedef {import('./queue_wishes.js').Wishes} Wishes */
+/** @typedef {ReturnType<typeof factsOf>} Facts */
 
 export const URGENT_S = 20;
 const LONGEST_NAME = 14; // of a reader
@@ -83,18 +84,24 @@ function choiceOf(title, words, value, onchange) {
 /**
  * The list: groups of like questions under their heads, flat, so that what stays is never moved.
  * @param {page.App} app
+ * @param {import('../page/redraw.js').Cards} cards that there were, by question
  * @param {Group[]} groups
  * @param {Ways} ways
  * @returns {page.Child[]}
  */
-export function queueList(app, groups, ways) {
+export function queueList(app, cards, groups, ways) {
+  const now = app.store.now();
+  cards.only(groups.flatMap(({ questions }) => questions.map(({ key }) => key)));
   let before = false; // a group with a head
   return groups.flatMap(({ alike, questions }) => {
     const many = questions.length > 1;
     const head = many ? groupHead(app, alike, questions, ways)
       : before && h('p', { key: 'after ' + alike, class: 'group-end', 'aria-hidden': true });
     before = many;
-    return [head, ...questions.map((question) => card(app, question, ways))];
+    return [head, ...questions.map((question) => {
+      const facts = factsOf(app, question, ways.isChosen(question.key), now);
+      return cards.card(question.key, facts, () => card(facts, now, ways));
+    })];
   });
 }
 
@@ -114,37 +121,59 @@ function groupHead(app, alike, questions, { answerAlike }) {
 }
 
 /**
+ * What its card says of a question: few words, which are compared quickly. How long it has waited
+ * grows without them.
  * @param {page.App} app
  * @param {server.Question} question
+ * @param {boolean} chosen
+ * @param {number} now by the server's clock
+ */
+function factsOf(app, question, chosen, now) {
+  const { key, status, state, robot, path, what, text, holder, asked, deadline, rate, continuous,
+    class: rank, interface: name } = question;
+  return { key, status, state, robot, path, what, holder, asked, deadline, rate, continuous, rank,
+    name, chosen, cause: causeOf(text), advised: adviceOf(question), mine: app.isMine(question),
+    waiting: waits(question), readers: readersOf(app, key),
+    silent: Boolean(app.liveness.whoIsSilent(question)),
+    urgent: deadline !== null && deadline - now < URGENT_S };
+}
+
+/**
+ * @param {Facts} facts
+ * @param {number} now by the server's clock
  * @param {Ways} ways
  */
-function card(app, question, { isChosen, choose }) {
-  const { key, status, state, robot, path, what, text } = question;
-  const silent = app.liveness.whoIsSilent(question) ? ' silent' : '';
-  const cause = causeOf(text);
-  return h('button', { key, class: 'question-row ' + status + silent, 'data-key': key,
-    'data-deliberate': 'open ' + key, 'aria-current': isChosen(key),
+function card(facts, now, { choose }) {
+  const { key, status, state, robot, path, what, cause, silent, chosen } = facts;
+  return h('button', { class: 'question-row ' + status + (silent ? ' silent' : ''),
+    'data-key': key, 'data-deliberate': 'open ' + key, 'aria-current': chosen,
     onclick: (/** @type {Event} */ event) => choose(key, wasMeant(event)) },
   h('span', { class: 'row' }, robotMark(robot), h('span', { class: 'where' }, h('b', {}, robot),
     h('span', { class: 'dim' }, ' · ', breakable(path, '/'))),
-  h('span', { class: 'spacer' }), statusChip(app, question)),
+  h('span', { class: 'spacer' }), statusChip(facts)),
   h('span', { class: 'sentence' }, h('strong', {}, breakable(state, '_')), ' ', what),
   cause && h('span', { class: 'cause', title: cause }, cause),
-  adviceLine(question), severity(question), times(app, question));
+  adviceLine(facts), severity(facts), times(facts, now));
 }
 
 /** @param {server.Question} question */
-function adviceLine(question) {
+function adviceOf(question) {
   const found = advice(question);
   if (!found) return null;
   const { choice: { state, container, helped: [helped, tried] }, why } = found;
-  return h('span', { class: 'advice', title: why },
-    h('strong', {}, '→ ', container && container + '/', breakable(state, '_')), ' ',
-    why ? 'recommended: ' + why : 'led on ' + helped + ' of ' + tried + ' before');
+  return { state, container, why, words: why ? 'recommended: ' + why
+    : 'led on ' + helped + ' of ' + tried + ' before' };
 }
 
-/** @param {server.Question} question */
-function severity({ class: rank, continuous, rate }) {
+/** @param {Facts} facts */
+function adviceLine({ advised }) {
+  return advised && h('span', { class: 'advice', title: advised.why },
+    h('strong', {}, '→ ', advised.container && advised.container + '/',
+      breakable(advised.state, '_')), ' ', advised.words);
+}
+
+/** @param {Facts} facts */
+function severity({ rank, continuous, rate }) {
   const words = FAILURE_CLASSES[rank];
   return h('span', { class: 'chips' },
     words && chip(words + ' failure rate', 'class-' + rank),
@@ -155,35 +184,29 @@ function severity({ class: rank, continuous, rate }) {
 }
 
 /**
- * @param {page.App} app
- * @param {server.Question} question
+ * @param {Facts} facts
+ * @param {number} now by the server's clock
  */
-function times(app, { asked, deadline, status }) {
-  const now = app.store.now();
-  const left = deadline === null ? Infinity : deadline - now;
+function times({ asked, deadline, status, urgent }, now) {
+  const pending = status === 'pending';
   return h('span', { class: 'row times' },
-    h('span', { class: 'dim' }, (status === 'pending' ? 'waits ' : 'asked ') + duration(now - asked)
-      + (status === 'pending' ? '' : ' ago')),
+    h('span', { class: 'dim' }, pending ? 'waits ' : 'asked ', since(asked, now),
+      !pending && ' ago'),
     h('span', { class: 'spacer' }),
-    left < Infinity ? h('span', { class: 'left' + (left < URGENT_S ? ' urgent' : '') },
-      duration(left) + ' left') : h('span', { class: 'dim' }, 'no time limit'));
+    deadline === null ? h('span', { class: 'dim' }, 'no time limit')
+      : h('span', { class: 'left' + (urgent ? ' urgent' : '') }, until(deadline, now), ' left'));
 }
 
-/**
- * @param {page.App} app
- * @param {server.Question} question
- */
-function statusChip(app, question) {
-  const { key, status, holder, interface: name } = question;
+/** @param {Facts} facts */
+function statusChip({ status, holder, name, mine, waiting, readers }) {
   if (status === 'interface') {
     return chip(name + ' runs', 'accent', 'The interface that somebody started for it');
   }
-  const mine = app.isMine(question);
-  if (waits(question) && holder) {
+  if (waiting && holder) {
     return chip((mine ? 'yours' : holder) + ' · idle', 'bad',
       'Whoever holds it has pressed nothing for a while');
   }
-  if (!holder) return chip(readWords(readersOf(app, key)), 'bad');
+  if (!holder) return chip(readWords(readers), 'bad');
   return mine ? chip('yours', 'good') : chip(holder, 'warn');
 }
 

@@ -5,7 +5,7 @@ import { unlessLost } from '../page/connection.js';
 import { h } from '../page/dom.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { counted } from '../page/format.js';
-import { keep, render, renderWith } from '../page/redraw.js';
+import { Cards, render } from '../page/redraw.js';
 import { fleetCard } from './fleet_card.js';
 import { byNeed, factsOf, needsHelp, resumedWords, robotsOf } from './fleet_facts.js';
 
@@ -31,8 +31,7 @@ class FleetPanel {
     this.facts = [];
     /** @type {string[]} */
     this.order = []; // in which they are shown
-    /** @type {Map<string, HTMLElement>} */
-    this.cards = new Map(); // by robot
+    this.cards = new Cards('section'); // by robot
     this.reply = { ok: true, message: '' };
     this.touchedAt = this.repliedAt = -Infinity; // ms
     this.timer = 0;
@@ -75,7 +74,7 @@ class FleetPanel {
    * @param {string[]} names
    */
   settle(names) {
-    for (const robot of this.cards.keys()) if (!names.includes(robot)) this.cards.delete(robot);
+    this.cards.only(names);
     const rests = performance.now() - this.touchedAt > AT_REST_MS;
     this.order = rests ? names : [...this.order.filter((robot) => names.includes(robot)),
       ...names.filter((robot) => !this.order.includes(robot))];
@@ -140,17 +139,14 @@ class FleetPanel {
   /** @param {RobotFacts} facts */
   card(facts) {
     const { robot } = facts;
-    const card = this.cards.get(robot) || h('section', {});
-    this.cards.set(robot, card);
     const chosen = this.wanted.has(robot);
     const mayResume = this.mayResume(facts);
-    renderWith(card, [facts, chosen, mayResume], () => fleetCard(this.app, facts, {
+    return this.cards.card(robot, [facts, chosen, mayResume], () => fleetCard(this.app, facts, {
       chosen, mayResume, choose: () => this.choose(robot),
       send: (order) => {
         if (order === 'resume') this.resume([facts]);
         else this.hold(order, [robot]);
       } }));
-    return keep(card);
   }
 
   /** @param {string} robot that is chosen from now on, or no longer */
