@@ -1,8 +1,12 @@
 """A state that is not repeated by itself is not, on whatever way a stored trial goes on."""
 
 import contextlib
+import functools
 import io
+import pathlib
 import random
+import shutil
+import tempfile
 
 import pytest
 from killed_machines import KilledMachine, Noted
@@ -38,6 +42,7 @@ class Sends(Expert):
         return ByHand().ask(question, cancelled, progress)
 
 
+@functools.lru_cache(maxsize=None)
 def chain(*labels, failing=''):
     """A machine of these states in this order; `failing` does not come to a good end."""
 
@@ -58,6 +63,7 @@ def chain(*labels, failing=''):
     return build
 
 
+@functools.lru_cache(maxsize=None)
 def nested(*labels):
     """The same in a container, before a last state."""
 
@@ -76,8 +82,27 @@ FLAT = chain('LOOK', 'POUR', 'CARRY')
 NESTED = nested('LOOK', 'POUR', 'CARRY')
 
 
+# by machine, state and settings: where a program was killed in that state
+KILLED = {}
+
+
 def killed_in(folder, build, state, **settings):
-    """The machine, killed while a state runs."""
+    """The machine, killed while a state runs.
+
+    Where to kill it is looked for once, by up to fifteen programs. Each test has a copy of what the
+    last one has left. With anything patched, `look_for` it.
+    """
+    key = (build, state, repr(settings))
+    if key not in KILLED:
+        KILLED[key] = tempfile.TemporaryDirectory()
+        look_for(pathlib.Path(KILLED[key].name, 'killed'), build, state, settings)
+    shutil.rmtree(str(folder), ignore_errors=True)
+    shutil.copytree(str(pathlib.Path(KILLED[key].name, 'killed')), str(folder))
+    return KilledMachine(folder, build, **settings)
+
+
+def look_for(folder, build, state, settings):
+    """Kill the machine at one point after another, until a state had begun."""
     killed, point = KilledMachine(make(folder), build, **settings), 0
     while not killed.diary.count('begins')[state] > killed.diary.count('ends')[state]:
         killed, point = KilledMachine(make(folder), build, **settings), point + 1
