@@ -28,10 +28,6 @@ export class DriveViews {
   constructor(app, robot) {
     this.app = app;
     this.robot = robot;
-    /** @type {server.Sensor[]} */
-    this.own = [];
-    /** @type {server.Sensor[]} */
-    this.others = []; // cameras that are not known as its own
     this.chosen = remembered(PREFERENCE, '').split('\n').filter(Boolean); // topics
     /** @type {Map<string, View>} */
     this.views = new Map(); // by topic
@@ -41,20 +37,20 @@ export class DriveViews {
 
   stop() { for (const view of this.views.values()) view.stop(); }
 
-  update() {
+  /** The cameras that are known as the robot's own, the likeliest one first, and the robot. */
+  get own() {
     const { sensors } = this.app.store;
-    const ownTopics = this.app.store.get('cameras')?.[this.robot] || [];
     const model = robotOf(this.app, this.robot + '/');
-    const cameras = sensors.filter((each) => each.kind === 'image');
-    /** @param {server.Sensor} sensor */
-    const isOwn = ({ topic }) => ownTopics.includes(topic);
-    this.own = [
-      ...cameras.filter(isOwn).sort((one, other) => (
-        ownTopics.indexOf(one.topic) - ownTopics.indexOf(other.topic))),
-      ...sensors.filter((each) => each.kind === 'robot' && each.topic === model)];
-    this.others = cameras.filter((each) => !isOwn(each));
-    this.show();
+    return [...this.ownTopics.flatMap((topic) => this.cameras.find((each) => each.topic === topic)
+      || []), ...sensors.filter(({ kind, topic }) => kind === 'robot' && topic === model)];
   }
+
+  /** Cameras that are not. */
+  get others() { return this.cameras.filter(({ topic }) => !this.ownTopics.includes(topic)); }
+
+  get cameras() { return this.app.store.sensors.filter(({ kind }) => kind === 'image'); }
+
+  get ownTopics() { return this.app.store.get('cameras')?.[this.robot] || []; }
 
   /** The sensors that are looked at, in the order in which they were chosen. */
   get looked() {
@@ -71,10 +67,10 @@ export class DriveViews {
       : [...before, topic].slice(-MOST);
     const own = this.own.map((each) => each.topic);
     remember(PREFERENCE, this.chosen.filter((each) => own.includes(each)).join('\n'));
-    this.show();
+    this.draw();
   }
 
-  show() {
+  draw() {
     const { looked, own, others } = this;
     const topics = looked.map((each) => each.topic);
     const foreign = others.map((each) => each.topic).filter((each) => topics.includes(each));

@@ -2,7 +2,8 @@
 // What every interface has while it runs: what it prints, and its end; with the controls of a hand
 // where it moves one.
 import { outputFields, readOutputs } from '../answering/output_field.js';
-import { h, replace, setText } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
+import { keep, render } from '../page/redraw.js';
 import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
 import { ManipulationPanel } from './manipulation_panel.js';
 
@@ -26,35 +27,39 @@ export class InterfacePanel {
     this.busy = false;
     /** @type {ManipulationPanel | null} */
     this.manipulation = null;
-    this.printed = ''; // what is shown of the output
-    this.title = h('span', { class: 'dim' });
+    this.name = name;
     this.lines = h('pre', { class: 'output-lines', tabindex: 0 });
-    this.output = h('details', { class: 'card output', hidden: true },
-      h('summary', {}, h('strong', {}, 'Interface ', name), ' ', this.title), this.lines);
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outcome = outcomeChoice(question);
+    this.outcomeRow = outcomeRow(this.outcome);
     this.why = h('input', { type: 'text', maxlength: 2000, placeholder: RECORD + ' (optional)',
       'aria-label': RECORD });
     this.outputs = outputFields(question, () => setText(this.problem, ''));
-    this.finish = h('button', { class: 'primary finish',
-      'data-deliberate': 'finish', onclick: () => this.handOver() },
-      'Done: the work is finished');
-    this.quit = h('button', { class: 'quit', 'data-deliberate': 'give up',
-      onclick: () => this.giveUp() }, 'Give up');
-    this.end = this.buildEnd();
-    this.place = h('div', { class: 'manipulation-place' });
-    this.root = h('div', { class: 'interface-panel' }, this.place, this.end, this.output);
-    this.update();
+    this.root = h('div', {});
+    this.draw();
   }
 
-  buildEnd() {
-    const { outputs } = this;
-    return h('section', { class: 'card interface-end' },
-      h('h3', {}, 'When ', this.question.state, ' is done'), outcomeRow(this.outcome),
+  view() {
+    const { store, mayAnswer } = this.app;
+    const { question: { key, state }, outputs, manipulation } = this;
+    const output = store.get('interface_output')?.[key];
+    const off = !mayAnswer || this.busy;
+    return h('div', { class: 'interface-panel' },
+      h('div', { class: 'manipulation-place' }, manipulation && keep(manipulation.root)),
+      h('section', { class: 'card interface-end', // one that marks has an end of its own
+        hidden: key in (store.get('sensors')?.perception || {}) },
+      h('h3', {}, 'When ', state, ' is done'), keep(this.outcomeRow),
       outputs.length > 0 && h('details', { class: 'outputs' },
         h('summary', {}, 'Output userdata that the interface cannot tell itself'),
-        outputs.map((output) => output.root)),
-      this.why, h('div', { class: 'row' }, this.finish, this.quit), this.problem);
+        outputs.map(({ root }) => keep(root))),
+      keep(this.why), h('div', { class: 'row' },
+        h('button', { class: 'primary finish', disabled: off, 'data-deliberate': 'finish',
+          onclick: () => this.handOver() }, 'Done: the work is finished'),
+        h('button', { class: 'quit', disabled: off, 'data-deliberate': 'give up',
+          onclick: () => this.giveUp() }, 'Give up')), keep(this.problem)),
+      h('details', { class: 'card output', hidden: !output },
+        h('summary', {}, h('strong', {}, 'Interface ', this.name), ' ',
+          h('span', { class: 'dim' }, output && STATUS[output.status])), keep(this.lines)));
   }
 
   stop() {
@@ -62,27 +67,19 @@ export class InterfacePanel {
     this.manipulation = null;
   }
 
-  update() {
-    const { key } = this.question;
-    const { store, mayAnswer } = this.app;
-    if (this.manipulation) this.manipulation.update();
-    else if (key in (store.get('manipulation') || {})) {
-      this.manipulation = new ManipulationPanel(this.app, this.question);
-      replace(this.place, this.manipulation.root);
+  draw() {
+    const { app, question } = this;
+    if (this.manipulation) this.manipulation.draw();
+    else if (question.key in (app.store.get('manipulation') || {})) {
+      this.manipulation = new ManipulationPanel(app, question);
     }
-    this.end.hidden = key in (store.get('sensors')?.perception || {}); // that one has its own
-    this.finish.disabled = this.quit.disabled = !mayAnswer || this.busy;
-    this.showOutput(store.get('interface_output')?.[key]);
+    render(this.root, this.view());
+    const output = app.store.get('interface_output')?.[question.key];
+    if (output) this.print([output.text, ...output.lines].join('\n'));
   }
 
-  /** @param {server.InterfaceOutput | undefined} output */
-  showOutput(output) {
-    this.output.hidden = !output;
-    if (!output) return;
-    setText(this.title, STATUS[output.status]);
-    const text = [output.text, ...output.lines].join('\n');
-    if (this.printed === text) return;
-    this.printed = text;
+  /** @param {string} text at whose end whoever was there stays */
+  print(text) {
     const { scrollHeight, scrollTop, clientHeight } = this.lines;
     setText(this.lines, text);
     if (scrollHeight - scrollTop - clientHeight < AT_THE_END) {
@@ -110,11 +107,11 @@ export class InterfacePanel {
     if (this.busy) return;
     this.busy = true;
     setText(this.problem, '');
-    this.update();
+    this.draw();
     const reply = await replyTo(this.app, this.problem, command, args);
     if (reply && reply.ok) this.onEnd();
     else if (reply) setText(this.problem, reply.message);
     this.busy = false;
-    this.update();
+    this.draw();
   }
 }

@@ -5,7 +5,7 @@ import { vector } from '../drawing/transforms.js';
 import { h, setText } from '../page/dom.js';
 import { NO_EMERGENCY_STOP } from '../page/emergency.js';
 import { remember, remembered } from '../page/preferences.js';
-import { redraw } from '../page/redraw.js';
+import { redraw, render } from '../page/redraw.js';
 import { DriveInput } from './drive_input.js';
 import { BUTTONS, MOTIONS, MOVES } from './drive_moves.js';
 import { DriveViews } from './drive_views.js';
@@ -46,13 +46,7 @@ export class ManipulationPanel {
     this.arm = ''; // the one that the interface has chosen, until the person chooses
     /** @type {number | null} */
     this.wheel = null; // the number under which this page took it
-    this.arms = h('div', { class: 'row wrap arms', role: 'group', 'aria-label': 'Arm' });
-    this.wheelButton = h('button', { class: 'primary wheel', onclick: () => this.turnWheel() });
-    this.driver = h('span', { class: 'dim driver', role: 'status' });
-    this.stopButton = h('button', { class: 'stop', 'data-action': 'stop-hand',
-      onclick: () => this.stopHand() }, '■ Stop the hand');
     this.problem = h('p', { class: 'problem', role: 'alert' });
-    this.frames = h('div', { class: 'row wrap' });
     /** @type {server.DriveFrame} */
     this.frame = frameOf(remembered('drive frame', 'tool'));
     this.scale = h('input', { type: 'range', min: 5, max: 100, step: 5,
@@ -61,39 +55,68 @@ export class ManipulationPanel {
     this.scaleText = h('output', { class: 'number' });
     /** @type {Map<Move, HTMLButtonElement>} */
     this.pads = new Map(MOVES.map((move) => [move, this.pad(move)]));
-    this.light = h('div', { class: 'drive-light' });
+    // each of its own: what is pressed in one holds up no other
+    this.head = h('div', {});
+    this.light = h('div', {});
     this.facts = h('dl', { class: 'drive-facts' });
+    this.choices = h('div', {});
     this.views = new DriveViews(app, question.robot);
     this.hint = h('p', { class: 'dim hint' });
     this.root = this.build();
     this.showScale();
     this.showHeld(this.input.read());
     this.timer = setInterval(() => this.beat(), PERIOD_MS);
-    this.update();
+    this.draw();
   }
 
   build() {
-    return h('section', { class: 'card manipulation', 'aria-label': 'Drive the hand' },
-      h('div', { class: 'manipulation-head' },
-        h('h3', {}, 'Drive the hand for ', this.question.state), this.driver,
-        h('span', { class: 'spacer' }), this.wheelButton, this.stopButton),
+    return h('section', { class: 'card manipulation', 'aria-label': 'Drive the hand' }, this.head,
       this.problem, h('p', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP),
       h('div', { class: 'manipulation-body' },
         h('div', { class: 'manipulation-see' }, this.light, this.views.root, this.facts),
-        this.buildControls()));
+        h('div', { class: 'manipulation-controls' }, this.choices,
+          h('label', { class: 'row' },
+            h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
+          h('h4', {}, TITLES.linear), this.padGroup('linear'),
+          h('h4', {}, TITLES.angular), this.padGroup('angular'),
+          h('h4', {}, 'Gripper'),
+          h('div', { class: 'pads two', role: 'group', 'aria-label': 'Gripper' },
+            this.pads.get('open'), this.pads.get('close')),
+          this.hint)));
   }
 
-  buildControls() {
-    return h('div', { class: 'manipulation-controls' },
-      h('div', { class: 'manipulation-choices' }, this.arms, this.frames),
-      h('label', { class: 'row' },
-        h('span', { class: 'dim' }, 'Speed'), this.scale, this.scaleText),
-      h('h4', {}, TITLES.linear), this.padGroup('linear'),
-      h('h4', {}, TITLES.angular), this.padGroup('angular'),
-      h('h4', {}, 'Gripper'),
-      h('div', { class: 'pads two', role: 'group', 'aria-label': 'Gripper' },
-        this.pads.get('open'), this.pads.get('close')),
-      this.hint);
+  headView() {
+    const { mine, manipulation: now } = this;
+    const { connected } = this.app.connection;
+    const may = this.app.role === 'teleoperator';
+    const nobody = 'Nobody drives' + (may ? '.' : '; to drive needs the role of a teleoperator.');
+    const driver = mine ? 'You drive.' : now && now.driver ? now.driver + ' drives.' : nobody;
+    return h('div', { class: 'manipulation-head' },
+      h('h3', {}, 'Drive the hand for ', this.question.state),
+      h('span', { class: 'dim driver', role: 'status' },
+        connected ? driver : 'No connection: the hand stands.'),
+      h('span', { class: 'spacer' }),
+      h('button', { class: 'primary wheel', disabled: !may || !now || !connected,
+        'data-deliberate': mine ? null : 'take the wheel', // to leave it is always possible
+        onclick: () => this.turnWheel() }, mine ? 'Leave the wheel' : 'Take the wheel'),
+      h('button', { class: 'stop', 'data-action': 'stop-hand', onclick: () => this.stopHand() },
+        '■ Stop the hand'));
+  }
+
+  /** Its arms, where the interface offers several, and the frames along whose axes it moves. */
+  choicesView() {
+    const { arms, state, frames } = this.manipulation || UNKNOWN;
+    const arm = this.arm || (state ? state.arm : '');
+    return h('div', { class: 'manipulation-choices' },
+      h('div', { class: 'row wrap arms', role: 'group', 'aria-label': 'Arm',
+        hidden: arms.length < 2 }, h('span', { class: 'dim' }, 'Arm'), arms.map((each) => (
+        h('button', { key: each, class: 'tool', 'data-arm': each, 'aria-pressed': each === arm,
+          onclick: () => this.chooseArm(each) }, each)))),
+      h('div', { class: 'row wrap' },
+        h('span', { class: 'dim frame-words' }, 'Along the axes of the'), frames.map((each) => (
+          h('button', { key: each, class: 'tool', 'data-frame': each,
+            'aria-pressed': each === this.frame, onclick: () => this.choose(each) },
+          FRAMES[each])))));
   }
 
   /** @param {MoveKind} kind */
@@ -138,7 +161,7 @@ export class ManipulationPanel {
     const reply = await this.app.connection.ask(command, { question: this.question.key }, '');
     this.wheel = reply.ok && reply.data ? reply.data.wheel : null;
     setText(this.problem, reply.ok ? '' : reply.message);
-    this.update();
+    this.draw();
   }
 
   /** Stops every driver: always possible, for everybody, and sent at once. */
@@ -155,40 +178,14 @@ export class ManipulationPanel {
     this.input.releaseAll();
     remember('drive frame', frame);
     this.frame = frame;
-    this.update();
-  }
-
-  /** @param {server.DriveFrame[]} frames that the interface knows */
-  showFrames(frames) {
-    if (frames.length && !frames.includes(this.frame)) {
-      this.input.releaseAll();
-      this.frame = frames[0];
-      this.input.unsettle(); // the person has not chosen it
-    }
-    redraw(this.frames, h('span', { class: 'dim frame-words' }, 'Along the axes of the'),
-      frames.map((frame) => h('button', { key: frame, class: 'tool', 'data-frame': frame,
-        'aria-pressed': frame === this.frame, onclick: () => this.choose(frame) },
-      FRAMES[frame])));
+    this.draw();
   }
 
   /** @param {string} arm */
   chooseArm(arm) {
     this.input.releaseAll();
     this.arm = arm;
-    this.update();
-  }
-
-  /**
-   * Where the interface offers several: the one that moves, and the others to change to.
-   * @param {server.Manipulation} manipulation
-   */
-  showArms({ arms, state }) {
-    if (this.arm && !arms.includes(this.arm)) this.arm = '';
-    const now = this.arm || (state ? state.arm : '');
-    this.arms.hidden = arms.length < 2;
-    redraw(this.arms, h('span', { class: 'dim' }, 'Arm'), arms.map((arm) => h('button', { key: arm,
-      class: 'tool', 'data-arm': arm, 'aria-pressed': arm === now,
-      onclick: () => this.chooseArm(arm) }, arm)));
+    this.draw();
   }
 
   showScale() {
@@ -233,38 +230,29 @@ export class ManipulationPanel {
     this.root.classList.toggle('driving', held);
   }
 
-  update() {
-    const { mine } = this;
-    const now = this.manipulation;
-    const { frames, state } = now || UNKNOWN;
-    if (!mine) this.input.releaseAll();
-    this.input.active = mine;
-    this.showWheel(now);
-    this.root.classList.toggle('mine', mine);
-    for (const button of this.pads.values()) button.disabled = !mine;
-    this.showFrames(frames);
-    this.showArms(now || UNKNOWN);
-    const { text, kind, share } = lightOf(state);
-    setText(this.light, text);
-    this.light.dataset['kind'] = kind;
-    this.light.style.setProperty('--share', String(share));
-    redraw(this.facts, factRows(now && state ? factsOf(now, state) : []));
-    this.views.update();
+  /** What was chosen and is not offered is not kept. */
+  settle() {
+    const { arms, frames } = this.manipulation || UNKNOWN;
+    if (this.arm && !arms.includes(this.arm)) this.arm = '';
+    if (!frames.length || frames.includes(this.frame)) return;
+    this.input.releaseAll();
+    this.frame = frames[0];
+    this.input.unsettle(); // the person has not chosen it
   }
 
-  /** @param {server.Manipulation | undefined} now */
-  showWheel(now) {
-    const { connected } = this.app.connection;
-    const may = this.app.role === 'teleoperator';
-    this.wheelButton.disabled = !may || !now || !connected;
-    setText(this.wheelButton, this.mine ? 'Leave the wheel' : 'Take the wheel');
-    if (this.mine) { // to leave it is always possible
-      delete this.wheelButton.dataset['deliberate'];
-      delete this.wheelButton.dataset['settled'];
-    } else this.wheelButton.dataset['deliberate'] = 'take the wheel';
-    const nobody = 'Nobody drives' + (may ? '.' : '; to drive needs the role of a teleoperator.');
-    const driver = now && now.driver ? now.driver + ' drives.' : nobody;
-    const shown = this.mine ? 'You drive.' : driver;
-    setText(this.driver, connected ? shown : 'No connection: the hand stands.');
+  draw() {
+    const { mine, manipulation: now } = this;
+    if (!mine) this.input.releaseAll();
+    this.input.active = mine;
+    this.root.classList.toggle('mine', mine);
+    for (const button of this.pads.values()) button.disabled = !mine;
+    this.settle();
+    const { text, kind, share } = lightOf(now?.state);
+    render(this.head, this.headView());
+    render(this.choices, this.choicesView());
+    render(this.light, h('div', { class: 'drive-light', 'data-kind': kind, '--share': share },
+      text));
+    redraw(this.facts, factRows(now && now.state ? factsOf(now, now.state) : []));
+    this.views.draw();
   }
 }

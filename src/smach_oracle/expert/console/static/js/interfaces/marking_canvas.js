@@ -6,22 +6,15 @@ import { drawCross, drawMarking } from './marking_drawing.js';
 import { MARKING_KEYS, MarkingKeys } from './marking_keys.js';
 
 /** @typedef {import('./marking.js').Tool} Tool */
-/**
- * @typedef {object} Use
- * @property {() => boolean} may whether somebody may draw now
- * @property {() => void} refused the image has no region yet that could be corrected
- * @property {() => void} begun a new region is being drawn
- * @property {() => void} marked there is something new to cut out
- * @property {() => void} ended a line has ended
- */
+/** @typedef {import('./perception_panel.js').PerceptionPanel} PerceptionPanel */
 
 const BRUSH = 7; // px of the screen
 const THINNEST = 2; // px of the image
 
 export class MarkingCanvas {
-  /** @param {Use} use */
-  constructor(use) {
-    this.use = use;
+  /** @param {PerceptionPanel} panel that it is a part of */
+  constructor(panel) {
+    this.panel = panel;
     this.marking = new Marking();
     /** @type {number[][]} */
     this.outlines = []; // of what was cut out
@@ -31,25 +24,11 @@ export class MarkingCanvas {
       role: 'application', 'aria-roledescription': 'drawing', 'aria-label': 'Mark the object here',
       'aria-describedby': 'marking-keys' });
     this.hint = h('p', { class: 'keys-hint', id: 'marking-keys' }, MARKING_KEYS);
-    this.keys = this.makeKeys();
-    this.root.addEventListener('pointerdown', (event) => this.begin(event));
+    this.keys = new MarkingKeys(this);
+    this.root.addEventListener('pointerdown', (event) => this.press(event));
     this.root.addEventListener('pointermove', (event) => this.move(event));
     this.root.addEventListener('pointerup', () => this.end());
     this.root.addEventListener('pointercancel', () => this.cancel());
-  }
-
-  makeKeys() {
-    return new MarkingKeys(this.root, {
-      size: () => [this.root.width, this.root.height],
-      scale: () => this.scale,
-      may: () => this.use.may(),
-      drawing: () => Boolean(this.marking.line),
-      begin: (point) => this.beginAt(point),
-      move: (point) => this.marking.move(point),
-      end: () => this.end(),
-      cancel: () => this.cancel(),
-      moved: () => this.paint(),
-    });
   }
 
   /**
@@ -59,23 +38,23 @@ export class MarkingCanvas {
   setSize([width, height]) { Object.assign(this.root, { width, height }); }
 
   /** @param {PointerEvent} event */
-  begin(event) {
-    if (!this.use.may() || !event.isPrimary || event.button) return;
+  press(event) {
+    if (!this.panel.mayDraw || !event.isPrimary || event.button) return;
     event.preventDefault();
     this.root.setPointerCapture(event.pointerId);
-    this.beginAt(this.at(event));
+    this.begin(this.at(event));
   }
 
   /** @param {server.Point} point */
-  beginAt(point) {
+  begin(point) {
     const correcting = isBrush(this.tool);
     if (correcting && !this.marking.region) {
-      this.use.refused();
+      this.panel.refuse();
       return;
     }
     const width = Math.max(THINNEST, Math.round(BRUSH * this.scale));
     this.marking.begin(this.tool, point, width);
-    if (!correcting) this.use.begun();
+    if (!correcting) this.panel.forget();
     this.paint();
   }
 
@@ -88,13 +67,13 @@ export class MarkingCanvas {
   }
 
   end() {
-    if (this.marking.end()) this.use.marked();
-    this.use.ended();
+    if (this.marking.end()) this.panel.cut();
+    this.panel.refresh();
   }
 
   cancel() {
     this.marking.line = null;
-    this.use.ended();
+    this.panel.refresh();
   }
 
   /** Pixels of the image for one of the screen. */

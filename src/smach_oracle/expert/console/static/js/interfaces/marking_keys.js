@@ -4,18 +4,7 @@
 import { announce } from '../page/announce.js';
 import { modified } from '../page/dom.js';
 
-/**
- * @typedef {object} Use
- * @property {() => server.Point} size of the image, px
- * @property {() => number} scale px of the image for one of the screen
- * @property {() => boolean} may whether somebody may draw now
- * @property {() => boolean} drawing whether a line has begun
- * @property {(point: server.Point) => void} begin
- * @property {(point: server.Point) => void} move
- * @property {() => void} end
- * @property {() => void} cancel
- * @property {() => void} moved the cross has moved, come or gone
- */
+/** @typedef {import('./marking_canvas.js').MarkingCanvas} MarkingCanvas */
 
 export const MARKING_KEYS = 'Arrow keys move the cross (with Shift by one pixel), Enter begins and '
   + 'ends what is drawn, Escape takes the line back.';
@@ -25,36 +14,33 @@ const QUIET_MS = 400; // without a key: then the cross's place is said
 const STEPS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 export class MarkingKeys {
-  /**
-   * @param {HTMLElement} canvas
-   * @param {Use} use
-   */
-  constructor(canvas, use) {
-    this.use = use;
+  /** @param {MarkingCanvas} canvas */
+  constructor(canvas) {
+    this.canvas = canvas;
     /** @type {server.Point | null} */
     this.cross = null; // null: it is not shown
     this.timer = 0;
-    canvas.addEventListener('keydown', (event) => this.key(event));
-    canvas.addEventListener('pointerdown', () => this.hide());
-    canvas.addEventListener('blur', () => this.leave());
+    canvas.root.addEventListener('keydown', (event) => this.key(event));
+    canvas.root.addEventListener('pointerdown', () => this.hide());
+    canvas.root.addEventListener('blur', () => this.leave());
   }
 
   /** @param {KeyboardEvent} event */
   key(event) {
     const step = STEPS[event.key];
     const sets = event.key === 'Enter' || event.key === ' ';
-    const takesBack = event.key === 'Escape' && this.use.drawing();
-    if (modified(event) || !(step || sets || takesBack) || !this.use.may()) return;
+    const takesBack = event.key === 'Escape' && this.canvas.marking.line;
+    if (modified(event) || !(step || sets || takesBack) || !this.canvas.panel.mayDraw) return;
     event.preventDefault();
     event.stopPropagation(); // these keys mean something else elsewhere on the page
     if (step) this.step(step, event.shiftKey);
-    else if (takesBack) this.use.cancel();
+    else if (takesBack) this.canvas.cancel();
     else if (!event.repeat) this.set();
   }
 
   /** Where the cross is: at first in the middle. */
   get place() {
-    const [width, height] = this.use.size();
+    const { width, height } = this.canvas.root;
     const [x, y] = this.cross || [width / 2, height / 2];
     return /** @type {server.Point} */ ([within(x, width), within(y, height)]);
   }
@@ -64,12 +50,12 @@ export class MarkingKeys {
    * @param {boolean} finely
    */
   step([dx, dy], finely) {
-    const by = finely ? 1 : Math.max(1, Math.round(STEP * this.use.scale()));
+    const by = finely ? 1 : Math.max(1, Math.round(STEP * this.canvas.scale));
     const [x, y] = this.place;
     this.cross = [x + dx * by, y + dy * by];
     this.cross = this.place;
-    if (this.use.drawing()) this.use.move(this.cross);
-    this.use.moved();
+    if (this.canvas.marking.line) this.canvas.marking.move(this.cross);
+    this.canvas.paint();
     clearTimeout(this.timer);
     this.timer = setTimeout(() => announce(this.words()), QUIET_MS);
   }
@@ -77,26 +63,27 @@ export class MarkingKeys {
   /** Begin what is drawn at the cross, or end it there. */
   set() {
     this.cross = this.place;
-    if (this.use.drawing()) this.use.end();
-    else this.use.begin(this.cross);
-    this.use.moved();
-    announce((this.use.drawing() ? 'It begins at ' : 'It ends at ') + this.words());
+    if (this.canvas.marking.line) this.canvas.end();
+    else this.canvas.begin(this.cross);
+    this.canvas.paint();
+    announce((this.canvas.marking.line ? 'It begins at ' : 'It ends at ') + this.words());
   }
 
   words() {
     const [x, y] = this.place;
-    return x + ', ' + y + ' of ' + this.use.size().join(' by ');
+    const { width, height } = this.canvas.root;
+    return x + ', ' + y + ' of ' + width + ' by ' + height;
   }
 
   hide() {
     clearTimeout(this.timer);
     this.cross = null;
-    this.use.moved();
+    this.canvas.paint();
   }
 
   /** The focus goes: what was begun by keys is not ended by them any more. */
   leave() {
-    if (this.cross && this.use.drawing()) this.use.cancel();
+    if (this.cross && this.canvas.marking.line) this.canvas.cancel();
     this.hide();
   }
 }

@@ -47,7 +47,7 @@ export class PerceptionPanel {
     this.warning = '';
     this.image = h('canvas', { class: 'image', width: 4, height: 3, role: 'img',
       'aria-label': 'The image to draw on' });
-    this.canvas = this.makeCanvas();
+    this.canvas = new MarkingCanvas(this);
     this.note = h('p', { class: 'view-note', role: 'status' }, 'Waiting for the image…');
     this.problem = h('p', { class: 'problem', role: 'alert' });
     this.outcome = outcomeChoice(question);
@@ -61,16 +61,6 @@ export class PerceptionPanel {
       { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
         say: (text, missing) => this.say(text, missing) });
     this.refresh();
-  }
-
-  makeCanvas() {
-    return new MarkingCanvas({
-      may: () => this.may && Boolean(this.stamp),
-      refused: () => setText(this.problem, FIRST),
-      begun: () => this.forget(),
-      marked: () => this.cut(),
-      ended: () => this.refresh(),
-    });
   }
 
   build() {
@@ -120,6 +110,12 @@ export class PerceptionPanel {
   }
 
   get may() { return this.app.mayAnswer && !this.over; }
+
+  /** Whether somebody may draw now. */
+  get mayDraw() { return this.may && Boolean(this.stamp); }
+
+  /** The image has no region yet that could be corrected. */
+  refuse() { setText(this.problem, FIRST); }
 
   get marking() { return this.canvas.marking; }
 

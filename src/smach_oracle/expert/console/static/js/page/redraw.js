@@ -5,8 +5,6 @@ import { h, keyOf, listenAs, nodesOf } from './dom.js';
 
 const CLICK_MS = 100; // by then the click of what was let go has come
 const PRESSED = 'button, summary, [role="button"], .mark, .event';
-// a person has opened it, and the page has noted how long it lies there
-const KEPT = new Set(['open', 'data-settled']);
 /** @type {WeakMap<Element, string>} */
 const drawn = new WeakMap(); // of what
 /** @type {WeakMap<Node, HTMLElement>} */
@@ -197,7 +195,10 @@ function alike(old, fresh) {
  */
 function copyAttributes(from, to) {
   for (const { name } of [...to.attributes]) {
-    if (!from.hasAttribute(name) && !KEPT.has(name)) to.removeAttribute(name);
+    // a person has opened it, or the page has noted how long it lies there
+    const stays = name === 'open' || (name === 'data-settled'
+      && from.hasAttribute('data-deliberate'));
+    if (!stays && !from.hasAttribute(name)) to.removeAttribute(name);
   }
   for (const { name, value } of from.attributes) {
     if (to.getAttribute(name) === value) continue;

@@ -12,9 +12,9 @@ import { aged } from '../page/liveness.js';
 import { keep, redraw, render } from '../page/redraw.js';
 import { MachineHand } from '../robots/machine_hand.js';
 import { MachineView, machinesNow } from '../robots/machine_view.js';
+import { LastSeconds } from '../sensors/last_seconds.js';
 import { callsWords } from './calls.js';
 import { claimBar } from './claim_bar.js';
-import { LastSeconds } from './last_seconds.js';
 import { lookAt, lookAway, namesOf } from './onlookers.js';
 import { URGENT_S } from './queue_view.js';
 import { failureCard, userdataCard, visitsCard } from './situation_cards.js';
@@ -54,7 +54,7 @@ export class QuestionDetail {
     this.machine = new MachineView(machinesNow(app.store), () => {});
     this.hand = new MachineHand(app);
     this.camera = new SituationCamera(app, question);
-    this.lastSeconds = new LastSeconds(app, question.key);
+    this.lastSeconds = new LastSeconds(app);
     this.way = h('div', {}, visitsCard(question));
     this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
     this.interfacePlace = h('div', { class: 'workbench', hidden: true });
@@ -284,7 +284,7 @@ export class QuestionDetail {
     const { now } = this;
     const name = now && now.status === 'interface' && !this.ended ? now.interface : null;
     if (name === null) this.endInterface();
-    else if (this.interfacePanel) this.interfacePanel.update();
+    else if (this.interfacePanel) this.interfacePanel.draw();
     else {
       this.interfacePanel = new InterfacePanel(this.app, this.question, name, () => this.follow());
       replace(this.interfacePlace, this.interfacePanel.root);
@@ -318,7 +318,7 @@ export class QuestionDetail {
     this.showPerception();
     this.showInterface();
     if (changed('images', 'cameras')) this.camera.draw();
-    if (changed('replays')) this.lastSeconds.update();
+    if (changed('replays')) this.lastSeconds.show(this.app.store.get('replays')?.[this.key]);
     if (changed('questions')) redraw(this.way, visitsCard(this.now || this.question));
     if (changed('questions', `live ${robot}`) || names?.some((name) => name.startsWith('graph '))) {
       this.machine.update();

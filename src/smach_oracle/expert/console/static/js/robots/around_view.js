@@ -49,13 +49,13 @@ export class AroundView {
     const label = this.chosen || focusState(graph, machine) || graph.states[0]?.label || '';
     redrawWith(this.root, [label, graph, machine, this.chosen], () => [
       h('section', {}, h('h3', {}, 'Leads here'),
-        h('ul', { class: 'ways' }, this.rows(waysTo(label, graph, machine), graph))),
+        h('ul', { class: 'ways' }, this.rows(waysOf(label, false, graph, machine), graph))),
       h('section', { class: 'around-middle' }, h('div', { class: 'around-state' },
         stateFacts(robot, label, graph, machine, this.onOpen)),
       h('button', { class: 'tool', title: 'Show what fails or is active',
         'aria-pressed': !this.chosen, onclick: () => this.choose('') }, 'Follow')),
       h('section', {}, h('h3', {}, 'Leads to'),
-        h('ul', { class: 'ways' }, this.rows(waysFrom(label, graph, machine), graph)))]);
+        h('ul', { class: 'ways' }, this.rows(waysOf(label, true, graph, machine), graph)))]);
   }
 
   /**
@@ -104,45 +104,22 @@ function stateFacts(robot, label, { path, states }, machine, onOpen) {
 }
 
 /**
+ * The ways that lead from a state, or to it: each once, those that were taken most first.
  * @param {string} label
+ * @param {boolean} onward from it
  * @param {server.Graph} graph
  * @param {machine.MachineState} machine
  */
-function waysFrom(label, { path, edges }, machine) {
-  const counts = (machine.counts[path] || []).filter(([from]) => from === label);
-  return sorted([
-    ...edges.filter(({ from }) => from === label)
-      .map(({ outcome, to }) => ({ label: to, outcome, times: 0, share: 0 })),
-    ...counts.map(([, outcome, to, number, share]) => (
-      { label: to, outcome, times: number, share })),
-  ]);
-}
-
-/**
- * @param {string} label
- * @param {server.Graph} graph
- * @param {machine.MachineState} machine
- */
-function waysTo(label, { path, edges }, machine) {
-  const counts = (machine.counts[path] || []).filter(([, , to]) => to === label);
-  return sorted([
-    ...edges.filter(({ to }) => to === label)
-      .map(({ from, outcome }) => ({ label: from, outcome, times: 0, share: 0 })),
-    ...counts.map(([from, outcome, , number, share]) => (
-      { label: from, outcome, times: number, share })),
-  ]);
-}
-
-/**
- * Each once, those that were taken most first.
- * @param {Way[]} ways
- */
-function sorted(ways) {
+function waysOf(label, onward, { path, edges }, machine) {
+  const known = edges.map(({ from, outcome, to }) => ({ from, outcome, to, times: 0, share: 0 }));
+  const taken = (machine.counts[path] || []).map(([from, outcome, to, number, share]) => (
+    { from, outcome, to, times: number, share }));
   /** @type {Map<string, Way>} */
   const found = new Map();
-  for (const way of ways) {
-    const key = JSON.stringify([way.label, way.outcome]);
-    if (!found.has(key) || way.times) found.set(key, way);
+  for (const { from, to, ...way } of [...known, ...taken]) {
+    const [here, there] = onward ? [from, to] : [to, from];
+    const key = JSON.stringify([there, way.outcome]);
+    if (here === label && (!found.has(key) || way.times)) found.set(key, { label: there, ...way });
   }
   return [...found.values()].sort((one, two) => two.times - one.times);
 }

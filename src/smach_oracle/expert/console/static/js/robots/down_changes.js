@@ -1,13 +1,12 @@
 // @ts-check
 // What may be changed in the store of a machine that is down, before it goes on.
-import { h, replace, setText, toast } from '../page/dom.js';
-import { redraw } from '../page/redraw.js';
-
-/** @typedef {'goto_stored' | 'edit_stored' | 'drop_stored'} Change */
+import { h, toast } from '../page/dom.js';
+import { render } from '../page/redraw.js';
 
 const NEEDS_ROLE = 'To change it needs the role of an operator.';
 const TO_DROP = 'Drop the trial? It is never resumed. When its program is started again, it begins '
   + 'at the start.';
+const NOTHING = { ok: true, message: '' };
 
 export class DownChanges {
   /**
@@ -17,28 +16,14 @@ export class DownChanges {
   constructor(app, row) {
     this.app = app;
     this.row = row;
-    this.state = h('select', { 'aria-label': 'State at which it goes on',
-      onchange: () => this.showMeaning() });
-    this.going = h('button', { type: 'submit', 'data-action': 'goto-stored' }, 'Go on there');
-    this.item = h('select', { 'aria-label': 'Userdata key' });
-    this.json = h('input', { type: 'text', maxlength: 40000, spellcheck: false,
-      autocomplete: 'off', 'aria-label': 'New value, as JSON', placeholder: '3, "cup", [1, 2]' });
-    this.editing = h('button', { type: 'submit', 'data-action': 'edit-stored' }, 'Change');
-    this.dropping = h('button', { 'data-action': 'drop-stored', onclick: () => this.ask() },
-      'Drop the trial');
-    this.asking = h('div', { class: 'drop-asking', role: 'group', 'aria-label': 'Drop the trial',
-      hidden: true });
-    this.why = h('p', { class: 'dim needs-role' });
-    this.reply = h('p', { class: 'dim', role: 'status' });
-    this.problem = h('p', { class: 'problem', role: 'alert' });
-    this.root = h('section', { class: 'down-changes', 'aria-label': 'Change it' },
-      h('form', { class: 'row wrap', onsubmit: (event) => this.goTo(event) },
-        h('span', {}, 'Go on at'), this.state, this.going),
-      h('form', { class: 'row wrap', onsubmit: (event) => this.edit(event) },
-        h('span', {}, 'Give'), this.item, h('span', {}, 'the value'), this.json, this.editing),
-      h('div', { class: 'row wrap' }, this.dropping), this.asking, this.why, this.problem,
-      this.reply);
+    this.label = ''; // of the state that is chosen, to go on there
+    /** @type {{ down: string, moment: number } | null} */
+    this.asked = null; // what may be dropped, as it was when it was asked for
+    this.replied = NOTHING;
+    this.root = h('section', {});
   }
+
+  get may() { return this.app.mayAnswer && this.app.connection.connected; }
 
   /**
    * What it is for a row as it is now.
@@ -46,74 +31,100 @@ export class DownChanges {
    */
   show(row) {
     this.row = row;
-    redraw(this.state, row.states.map((value) => h('option', { key: value, value }, value)));
-    redraw(this.item, row.userdata.map(([path, key]) => {
-      const value = JSON.stringify([path, key]);
-      return h('option', { key: value, value }, path + ' ' + key);
-    }));
-    const { mayAnswer, connection } = this.app;
-    const may = mayAnswer && connection.connected;
-    this.going.disabled = !may || !row.states.length;
-    this.editing.disabled = !may || !row.userdata.length;
-    this.dropping.disabled = !may;
-    if (!may) this.keep();
-    for (const button of [this.going, this.editing, this.dropping]) {
-      button.title = mayAnswer ? '' : NEEDS_ROLE;
-    }
-    setText(this.why, mayAnswer ? '' : NEEDS_ROLE);
-    this.showMeaning();
+    if (!row.states.includes(this.label)) this.label = row.states[0] || '';
+    if (this.asked && !this.may) this.keep();
+    else this.draw();
     return this.root;
   }
 
-  showMeaning() {
-    const { key, moment } = this.row;
-    const at = [key, moment].join(' ');
-    this.going.dataset['deliberate'] = 'goto_stored ' + at + ' ' + this.state.value;
-    this.editing.dataset['deliberate'] = 'edit_stored ' + at;
+  draw() { render(this.root, this.view()); }
+
+  view() {
+    const { row: { key, moment, states, userdata }, label, asked, may } = this;
+    const { ok, message } = this.replied;
+    const at = key + ' ' + moment;
+    return h('section', { class: 'down-changes', 'aria-label': 'Change it' },
+      h('form', { class: 'row wrap', onsubmit: (event) => this.goTo(event) },
+        h('span', {}, 'Go on at'),
+        h('select', { 'aria-label': 'State at which it goes on', onchange: ({ target }) => {
+          if (target instanceof HTMLSelectElement) this.label = target.value;
+          this.draw();
+        } }, states.map((value) => (
+          h('option', { key: value, value, selected: value === label }, value)))),
+        this.button('goto-stored', 'Go on there', may && states.length > 0,
+          { 'data-deliberate': 'goto_stored ' + at + ' ' + label })),
+      h('form', { class: 'row wrap', onsubmit: (event) => this.edit(event) },
+        h('span', {}, 'Give'), h('select', { 'aria-label': 'Userdata key' }, userdata.map(
+          ([path, item]) => h('option', { key: path + ' ' + item,
+            value: JSON.stringify([path, item]) }, path + ' ' + item))),
+        h('span', {}, 'the value'), h('input', { type: 'text', maxlength: 40000,
+          spellcheck: false, autocomplete: 'off', 'aria-label': 'New value, as JSON',
+          placeholder: '3, "cup", [1, 2]' }),
+        this.button('edit-stored', 'Change', may && userdata.length > 0,
+          { 'data-deliberate': 'edit_stored ' + at })),
+      h('div', { class: 'row wrap' }, this.button('drop-stored', 'Drop the trial', may,
+        { type: 'button', hidden: Boolean(asked), onclick: () => this.ask() })),
+      asked && h('div', { class: 'drop-asking', role: 'group', 'aria-label': 'Drop the trial' },
+        h('p', {}, TO_DROP), h('div', { class: 'row wrap' },
+          h('button', { class: 'danger', 'data-action': 'confirm-drop-stored',
+            'data-deliberate': 'confirm dropping ' + asked.down,
+            onclick: () => this.drop(asked) }, 'Yes, drop it'),
+          h('button', { 'data-action': 'keep-stored', onclick: () => this.keep() },
+            'No, go back'))),
+      h('p', { key: 'role', class: 'dim needs-role' }, !this.app.mayAnswer && NEEDS_ROLE),
+      h('p', { key: 'problem', class: 'problem', role: 'alert' }, !ok && message),
+      h('p', { key: 'reply', class: 'dim', role: 'status' }, ok && message));
+  }
+
+  /**
+   * @param {string} action
+   * @param {string} words
+   * @param {boolean} may
+   * @param {page.Properties} properties
+   */
+  button(action, words, may, properties) {
+    return h('button', { type: 'submit', 'data-action': action, disabled: !may,
+      title: this.app.mayAnswer ? null : NEEDS_ROLE, ...properties }, words);
+  }
+
+  /** @param {string} action whose button gets the focus */
+  focus(action) {
+    const button = this.root.querySelector('[data-action=' + action + ']');
+    if (button instanceof HTMLElement) button.focus();
   }
 
   /** @param {Event} event */
   goTo(event) {
     event.preventDefault();
-    this.send('goto_stored', { ...this.which, label: this.state.value });
+    this.send('goto_stored', { ...this.which, label: this.label });
   }
 
-  /** @param {Event} event */
+  /** @param {SubmitEvent} event */
   async edit(event) {
     event.preventDefault();
-    const [container, key] = JSON.parse(this.item.value);
-    const json = this.json.value;
-    if (await this.send('edit_stored', { ...this.which, container, key, json })) {
-      this.json.value = '';
-    }
+    const form = event.target instanceof Element ? event.target : this.root;
+    const [item, field] = [form.querySelector('select'), form.querySelector('input')];
+    if (!item || !field) return;
+    const [container, key] = JSON.parse(item.value);
+    const args = { ...this.which, container, key, json: field.value };
+    if (await this.send('edit_stored', args)) field.value = '';
   }
 
   /** It is never resumed then: it is asked for, and confirmed. */
   ask() {
-    const { which } = this;
-    const back = h('button', { 'data-action': 'keep-stored', onclick: () => this.keep() },
-      'No, go back');
-    replace(this.asking, h('p', {}, TO_DROP), h('div', { class: 'row wrap' },
-      h('button', { class: 'danger', 'data-action': 'confirm-drop-stored',
-        'data-deliberate': 'confirm dropping ' + which.down, onclick: () => this.drop(which) },
-      'Yes, drop it'), back));
-    this.turn(true);
-    back.focus();
+    this.asked = this.which;
+    this.draw();
+    this.focus('keep-stored');
   }
 
   keep() {
-    const free = this.asking.contains(document.activeElement);
-    this.turn(false);
-    if (free) this.dropping.focus();
+    const free = this.root.querySelector('.drop-asking')?.contains(document.activeElement);
+    this.asked = null;
+    this.draw();
+    if (free) this.focus('drop-stored');
   }
 
-  /** @param {boolean} asking */
-  turn(asking) {
-    this.asking.hidden = !asking;
-    this.dropping.hidden = asking;
-  }
-
-  /** @param {{ down: string, moment: number }} which as it was when it was asked for */
+  /** @param {{ down: string, moment: number }} which */
   drop(which) {
     this.keep();
     this.send('drop_stored', which);
@@ -123,16 +134,17 @@ export class DownChanges {
 
   /**
    * Whether it was done.
-   * @template {Change} Name
+   * @template {'goto_stored' | 'edit_stored' | 'drop_stored'} Name
    * @param {Name} name
    * @param {server.Commands[Name]} args
    */
   async send(name, args) {
-    setText(this.problem, '');
-    setText(this.reply, '');
-    const { ok, message } = await this.app.connection.ask(name, args, '');
-    setText(ok ? this.reply : this.problem, message);
+    this.replied = NOTHING;
+    this.draw();
+    this.replied = await this.app.connection.ask(name, args, '');
+    const { ok, message } = this.replied;
     if (ok && name === 'drop_stored') toast(message, 'good'); // its row goes
+    this.draw();
     return ok;
   }
 }

@@ -2,10 +2,19 @@
 // Curves of some joints over the last minute, or another time.
 import { h } from '../page/dom.js';
 
-export const HUES = [245, 20, 150, 320]; // of the curves
+const HUES = [245, 20, 150, 320]; // of the curves
 export const SPAN_S = 60;
 
 /** @typedef {[time: number, value: number]} Sample s, and the joint's unit */
+
+/**
+ * Whose curve has which colour.
+ * @param {string[]} names
+ */
+export function legendOf(names) {
+  return h('p', { class: 'plot-legend' }, names.map((name, index) => (
+    h('span', { class: 'series', '--hue': HUES[index] }, name))));
+}
 
 export class JointPlot {
   constructor() {

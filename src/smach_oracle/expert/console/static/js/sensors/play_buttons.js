@@ -1,6 +1,6 @@
 // @ts-check
 // The buttons of what can be played.
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 
 /**
  * @param {string} sign
@@ -14,12 +14,10 @@ export function playButton(sign, title, id, onclick) {
 }
 
 /**
- * @param {HTMLButtonElement} button
  * @param {boolean} playing
+ * @param {() => void} onclick
  */
-export function showPlaying(button, playing) {
-  const title = playing ? 'Pause' : 'Play';
-  setText(button, playing ? '❚❚' : '▶');
-  button.title = title;
-  button.setAttribute('aria-label', title);
+export function playOrPause(playing, onclick) {
+  return playing ? playButton('❚❚', 'Pause', 'play', onclick)
+    : playButton('▶', 'Play', 'play', onclick);
 }

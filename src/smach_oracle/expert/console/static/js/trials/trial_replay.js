@@ -6,7 +6,7 @@ import { added, chip } from '../page/format.js';
 import { keep, render } from '../page/redraw.js';
 import { MachineView } from '../robots/machine_view.js';
 import { MachineHistory, activePath, machineStateOf } from './machine_history.js';
-import { ReplayControls } from './replay_controls.js';
+import { replayControls } from './replay_controls.js';
 import { ReplayQuestion } from './replay_question.js';
 import { Timeline } from './timeline.js';
 
@@ -27,6 +27,7 @@ export class TrialReplay {
     this.history = new MachineHistory();
     this.following = true;
     this.playing = false;
+    this.speed = 1; // of playing
     this.t = 0;
     this.end = 0;
     this.index = -1; // of the event under the cursor
@@ -36,9 +37,7 @@ export class TrialReplay {
     this.state = { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
     this.timeline = new Timeline({ onSeek: (t) => this.seek(t), onPick: (seq) => this.pick(seq),
       onKey: (event) => this.key(event) });
-    this.controls = new ReplayControls({ first: () => this.to(0), back: () => this.step(-1),
-      play: () => this.toggle(), forward: () => this.step(1), last: () => this.to(this.last),
-      follow: () => this.follow(true), zoom: (factor) => this.timeline.zoom(factor) });
+    this.controls = h('div', {});
     /** @type {machine.MachineSource} */
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
     this.view = new MachineView(source, (path) => this.open(path));
@@ -46,7 +45,7 @@ export class TrialReplay {
     this.question = new ReplayQuestion(app);
     this.stage = h('div', {});
     this.root = h('div', { class: 'replay', onkeydown: (event) => this.keyOutside(event) },
-      this.controls.root, this.timeline.root, this.words, this.question.root, this.stage);
+      this.controls, this.timeline.root, this.words, this.question.root, this.stage);
   }
 
   /** Index of the last event. */
@@ -63,7 +62,6 @@ export class TrialReplay {
       this.chosen = '';
       this.follow(true);
     }
-    this.controls.showRunning(trial.running);
     this.timeline.set(trial.events, this.end);
     if (this.following) this.place(this.end);
     else this.show();
@@ -75,10 +73,9 @@ export class TrialReplay {
   /** @param {boolean} on */
   follow(on) {
     this.following = on;
-    this.controls.showFollowing(on);
-    if (!on) return;
-    this.stop();
-    if (this.trial.events.length) this.place(this.end);
+    if (on) this.stop();
+    if (on && this.trial.events.length) this.place(this.end);
+    this.drawControls();
   }
 
   /** @param {number} t */
@@ -123,7 +120,7 @@ export class TrialReplay {
     const event = events[Math.max(0, this.index)];
     const now = seconds(this.t - begin);
     this.timeline.place(this.t, now + ': ' + wordsOf(event));
-    this.controls.showTime(now + ' of ' + seconds(this.end - begin));
+    this.drawControls();
     const key = id + ' ' + this.index;
     if (key === this.shown) return;
     this.shown = key;
@@ -132,6 +129,12 @@ export class TrialReplay {
     this.words.className = 'replay-words ' + event.kind;
     this.draw();
     this.onCursor(event);
+  }
+
+  drawControls() {
+    const { begin } = this.history;
+    render(this.controls, replayControls(this, seconds(this.t - begin) + ' of '
+      + seconds(this.end - begin)));
   }
 
   draw() {
@@ -198,7 +201,7 @@ export class TrialReplay {
 
   /** @param {number} passed s */
   playOn(passed) {
-    if (this.root.isConnected) this.place(this.t + passed * this.controls.speed);
+    if (this.root.isConnected) this.place(this.t + passed * this.speed);
     else this.stop();
     if (this.t >= this.end && !this.trial.running) this.stop();
   }
@@ -208,7 +211,7 @@ export class TrialReplay {
   /** @param {boolean} playing */
   showPlaying(playing) {
     this.playing = playing;
-    this.controls.showPlaying(playing);
+    this.drawControls();
     this.words.setAttribute('aria-live', playing ? 'off' : 'polite');
   }
 

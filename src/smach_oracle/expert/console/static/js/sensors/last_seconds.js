@@ -1,11 +1,11 @@
 // @ts-check
-// The last seconds before a failure, beside its question: images frame by frame, what happened, and
-// the joints that moved most. Images come once somebody looks for more than the last one.
-import { h, replace, say, setText } from '../page/dom.js';
-import { redraw } from '../page/redraw.js';
-import { drawImage, imageCanvas } from '../sensors/image_canvas.js';
-import { HUES, JointPlot } from '../sensors/joint_plot.js';
-import { playButton, showPlaying } from '../sensors/play_buttons.js';
+// The last seconds before a failure: images frame by frame, what happened, and the joints that
+// moved most. Images come once somebody looks for more than the last one.
+import { h, say } from '../page/dom.js';
+import { keep, render } from '../page/redraw.js';
+import { drawImage, imageCanvas } from './image_canvas.js';
+import { JointPlot, legendOf } from './joint_plot.js';
+import { playButton, playOrPause } from './play_buttons.js';
 
 const STEP_S = 0.1;
 const CALM_MS = 1000; // from image to image, for those who want little motion
@@ -34,64 +34,78 @@ export function lengthOf({ seconds, frames, events, joints }) {
 }
 
 export class LastSeconds {
-  /**
-   * @param {page.App} app
-   * @param {string} question its key
-   */
-  constructor(app, question) {
+  /** @param {page.App} app */
+  constructor(app) {
     this.app = app;
-    this.question = question;
     this.number = 0; // of the replay, 0 for none
     /** @type {server.Replay} */
     this.replay = { seconds: 1, cameras: [], frames: [], events: [], joints: [] };
+    this.camera = ''; // that is shown
     /** @type {{ t: number, index: number }[]} */
-    this.frames = []; // of the chosen camera
+    this.frames = []; // of that camera
     /** @type {Map<number, Blob | string>} */
     this.images = new Map(); // by frame; a text: why there is none
-    this.length = 1; // s, of the time line
+    this.length = 0; // s, of the time line; 0: nothing has come yet
     this.t = 0; // s after the failure, so never above 0
     this.timer = 0; // 0 while it does not play
     this.loading = false;
     this.drawn = Promise.resolve(); // images are drawn one after the other
-    this.choice = h('select', { 'aria-label': 'Camera of the replay',
-      onchange: () => this.chooseCamera() });
     this.canvas = imageCanvas('the camera', ' before the failure');
     this.note = h('p', { class: 'view-note', role: 'status' });
     this.screen = h('div', { class: 'screen' }, this.canvas, this.note);
-    this.marks = h('div', { class: 'last-marks', 'aria-hidden': 'true' });
     this.slider = h('input', { type: 'range', max: 0, step: STEP_S, 'data-replay': 'scrubber',
       'aria-label': 'Time before the failure', oninput: () => this.seek(Number(this.slider.value)),
       onkeydown: (event) => this.key(event) });
-    this.playButton = playButton('▶', 'Play', 'play', () => this.toggle());
-    this.time = h('span', { class: 'number last-time' });
-    this.words = h('p', { class: 'last-words' });
     this.plot = new JointPlot();
-    this.legend = h('p', { class: 'plot-legend' });
-    this.joints = h('div', { class: 'last-joints' }, this.plot.canvas, this.legend);
-    this.resized = new ResizeObserver(() => this.showJoints());
-    this.resized.observe(this.joints);
-    this.title = h('h3', {});
-    this.root = this.build();
-    this.update();
+    this.resized = new ResizeObserver(() => this.drawPlot());
+    this.resized.observe(this.plot.canvas);
+    this.root = h('section', { class: 'card last-seconds', hidden: true });
   }
 
-  build() {
-    return h('section', { class: 'card last-seconds', hidden: true },
-      h('div', { class: 'row last-head' }, this.title, h('span', { class: 'spacer' }), this.choice),
-      h('div', { class: 'last-stage' }, this.screen, this.joints), this.marks, this.slider,
+  /** @param {string} when */
+  view(when) {
+    const { replay: { events, joints }, t } = this;
+    return h('section', { class: 'card last-seconds' },
+      h('div', { class: 'row last-head' },
+        h('h3', {}, 'Last ' + this.length + ' s before the failure'),
+        h('span', { class: 'spacer' }), this.cameraChoice()),
+      h('div', { class: 'last-stage' }, keep(this.screen),
+        h('div', { class: 'last-joints', hidden: !joints.length, '--at': this.share(t) },
+          keep(this.plot.canvas), legendOf(joints.map(({ name }) => name)))),
+      h('div', { class: 'last-marks', 'aria-hidden': 'true' }, events.map((event) => h('i', {
+        class: LANDMARKS.has(event.kind) ? 'landmark' : '', '--at': this.share(event.t) }))),
+      keep(this.slider),
       h('div', { class: 'row last-controls', role: 'group', 'aria-label': 'Replay' },
         playButton('|◂', 'To the beginning', 'first', () => this.seek(-this.length)),
-        playButton('◂', 'One image back', 'back', () => this.step(-1)), this.playButton,
+        playButton('◂', 'One image back', 'back', () => this.step(-1)),
+        playOrPause(this.timer > 0, () => this.toggle()),
         playButton('▸', 'One image on', 'on', () => this.step(1)),
         playButton('▸|', 'To the failure', 'last', () => this.seek(0)),
-        h('span', { class: 'spacer' }), this.time),
-      this.words);
+        h('span', { class: 'spacer' }), h('span', { class: 'number last-time' }, when)),
+      h('p', { class: 'last-words' }, events[latestAt(events, t)]?.words));
   }
 
-  /** Show what has come. What is shown stays where the question is open no longer. */
-  update() {
-    if (!this.root.hidden) this.showJoints(); // in the colours of now
-    const number = this.app.store.get('replays')?.[this.question];
+  cameraChoice() {
+    const { camera: shown, seen } = this;
+    return h('select', { 'aria-label': 'Camera of the replay', hidden: seen.length < 2,
+      onchange: ({ target }) => {
+        if (target instanceof HTMLSelectElement) this.chooseCamera(target.value);
+      } }, seen.map((camera) => h('option', { key: camera, value: camera,
+      selected: camera === shown }, camera)));
+  }
+
+  /** The cameras that gave an image. */
+  get seen() {
+    const { cameras, frames } = this.replay;
+    return cameras.filter((_, camera) => frames.some(([each]) => each === camera));
+  }
+
+  /**
+   * Show a replay. What is shown stays where there is none any more.
+   * @param {number | undefined} number
+   */
+  show(number) {
+    if (this.length) this.drawPlot(); // in the colours of now
     if (!number || number === this.number) return;
     this.number = number;
     this.fetch();
@@ -111,21 +125,10 @@ export class LastSeconds {
     this.replay = replay;
     this.images.clear();
     this.length = lengthOf(replay);
-    setText(this.title, 'Last ' + this.length + ' s before the failure');
-    this.slider.min = String(-this.length);
-    const seen = replay.cameras.filter((_, camera) => replay.frames.some(([each]) => (
-      each === camera)));
-    redraw(this.choice, seen.map((camera) => h('option', { key: camera }, camera)));
-    this.choice.hidden = seen.length < 2;
-    this.screen.hidden = !seen.length;
-    this.joints.hidden = !replay.joints.length;
-    replace(this.legend, replay.joints.map(({ name }, index) => (
-      h('span', { class: 'series', '--hue': HUES[index] }, name))));
-    replace(this.marks, replay.events.map(({ t, kind }) => (
-      h('i', { class: LANDMARKS.has(kind) ? 'landmark' : '', '--at': this.share(t) }))));
-    this.root.hidden = false;
     this.t = 0;
-    this.chooseCamera();
+    this.slider.min = String(-this.length);
+    this.screen.hidden = !this.seen.length;
+    this.chooseCamera(this.seen.includes(this.camera) ? this.camera : this.seen[0] || '');
   }
 
   /**
@@ -134,11 +137,13 @@ export class LastSeconds {
    */
   share(t) { return 1 + Math.max(-1, t / this.length); }
 
-  chooseCamera() {
-    const camera = this.replay.cameras.indexOf(this.choice.value);
+  /** @param {string} camera */
+  chooseCamera(camera) {
+    const wanted = this.replay.cameras.indexOf(camera);
+    this.camera = camera;
     this.frames = this.replay.frames.map(([each, t], index) => ({ each, t, index }))
-      .filter(({ each }) => each === camera);
-    this.show();
+      .filter(({ each }) => each === wanted);
+    this.draw();
   }
 
   /** @param {number} t */
@@ -151,7 +156,7 @@ export class LastSeconds {
   /** @param {number} t */
   place(t) {
     this.t = Math.min(0, Math.max(-this.length, t));
-    this.show();
+    this.draw();
   }
 
   /** The moments at which something is to be seen. */
@@ -172,7 +177,7 @@ export class LastSeconds {
     if (this.t > -STEP_S) this.place(this.stops.length ? this.stops[0].t : -this.length);
     const calm = matchMedia('(prefers-reduced-motion: reduce)').matches;
     this.timer = window.setInterval(() => this.playOn(calm), calm ? CALM_MS : STEP_S * 1000);
-    showPlaying(this.playButton, Boolean(this.timer));
+    this.draw();
     this.load();
   }
 
@@ -190,12 +195,12 @@ export class LastSeconds {
   stop() {
     clearInterval(this.timer);
     this.timer = 0;
-    showPlaying(this.playButton, Boolean(this.timer));
+    if (this.length) this.draw();
   }
 
   /** It is shown no longer. */
   end() {
-    this.stop();
+    clearInterval(this.timer);
     this.resized.disconnect();
   }
 
@@ -207,22 +212,17 @@ export class LastSeconds {
     this.toggle();
   }
 
-  show() {
-    const { t, replay } = this;
-    const event = replay.events[latestAt(replay.events, t)];
+  draw() {
+    const { t } = this;
     const when = t > -STEP_S / 2 ? 'at the failure' : (-t).toFixed(1) + ' s before the failure';
     this.slider.value = String(t);
     this.slider.setAttribute('aria-valuetext', when);
-    setText(this.time, when);
-    setText(this.words, event ? event.words : '');
-    this.showJoints();
+    render(this.root, this.view(when));
+    this.drawPlot();
     this.showImage();
   }
 
-  showJoints() {
-    this.joints.style.setProperty('--at', String(this.share(this.t)));
-    this.plot.draw(this.replay.joints.map(({ samples }) => samples), 0, this.length);
-  }
+  drawPlot() { this.plot.draw(this.replay.joints.map(({ samples }) => samples), 0, this.length); }
 
   /** The frame of the moment that is shown. */
   get frame() { return this.frames[Math.max(0, latestAt(this.frames, this.t))]; }
@@ -230,7 +230,7 @@ export class LastSeconds {
   showImage() {
     const { frame } = this;
     if (!frame) return;
-    this.canvas.setAttribute('aria-label', 'Image of ' + this.choice.value + ', '
+    this.canvas.setAttribute('aria-label', 'Image of ' + this.camera + ', '
       + (-frame.t).toFixed(1) + ' s before the failure');
     const image = this.images.get(frame.index);
     if (image === undefined) {
@@ -238,14 +238,16 @@ export class LastSeconds {
       return;
     }
     say(this.note, typeof image === 'string' ? image : '');
-    if (image instanceof Blob) this.drawn = this.drawn.then(() => this.draw(frame.index, image));
+    if (image instanceof Blob) {
+      this.drawn = this.drawn.then(() => this.drawFrame(frame.index, image));
+    }
   }
 
   /**
    * @param {number} frame
    * @param {Blob} image
    */
-  async draw(frame, image) {
+  async drawFrame(frame, image) {
     if (this.frame?.index !== frame) return; // another one is wanted meanwhile
     await drawImage(this.canvas, new Response(image)).catch(() => {}); // the next may be sound
     this.canvas.dataset['frame'] = String(frame);
