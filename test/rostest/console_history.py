@@ -38,7 +38,7 @@ MIDDLE = (
 # cursor; whether it is drawn where the cursor is far away; and on the whole axis again
 ZOOMED = """
 return import("/static/js/trials/timeline.js").then(({ Timeline }) => {
-  const line = new Timeline({ onPick() {}, onSeek() {}, onKey() {} });
+  const line = new Timeline({ pick() {}, seek() {}, key() {} });
   line.root.style.width = "900px";
   document.body.append(line.root);
   const events = [["state_start", 0], ["failure", 60], ["query_opened", 60],
@@ -196,6 +196,11 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
             float(slider.get_attribute('aria-valuenow')),
             float(slider.get_attribute('aria-valuemax')),
         )
+        self.assertTrue(browser.says('before the failure', '.replay .last-seconds h3'))
+        self.assertTrue(
+            wait_for(lambda: browser.run(MIDDLE, '.replay .last-seconds canvas.image')),
+            'the last seconds, out of the bag',
+        )
         slider.send_keys(Keys.PAGE_UP)
         self.assertTrue(browser.says('Question about PICK', '.replay-question'))
         self.assertTrue(browser.says('Not answered yet.', '.replay-question'))
@@ -225,7 +230,10 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         browser = self.browser
         slider = browser.find('.replay [role=slider]')
         slider.send_keys(Keys.HOME)
-        browser.run('document.querySelector(".replay-speed").value = "0.25"')
+        browser.run(
+            'const speed = document.querySelector(".replay-speed"); speed.value = "0.25";'
+            'speed.dispatchEvent(new Event("change"));'
+        )
         browser.click('[data-replay=play]')
         self.assertTrue(
             wait_for(lambda: 'active' in self.classes('DETECT')), 'it has come to the first state'

@@ -10,7 +10,7 @@ import math
 import os
 import resource
 import sys
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from smach_oracle.oracle.records.events import Event, EventKind
 from smach_oracle.oracle.records.facts import NOT_COUNTED, told_in_words
@@ -18,12 +18,21 @@ from smach_oracle.oracle.records.short_text import shortened
 from smach_oracle.oracle.settings.failure_rule import FORMER_RULE, RULE, rule_in
 
 from .bag_events import BagError, EventReader
-from .bag_machines import FailureImage, RecordedContainer, RecordedMachines, read_machines
+from .bag_machines import (
+    FailureImage,
+    RecordedContainer,
+    RecordedMachines,
+    RecordedReplay,
+    ReplayImage,
+    ReplayJoints,
+    read_machines,
+)
 from .counting.trial_summary import TrialSummary, summarise
 from .trial_counter import TrialEnding
 
 MOST_TEXT = 4000000  # of all events' texts, in characters
 MOST_IMAGES = 24000000  # bytes, of all failure images of a trial
+MOST_REPLAYED = 20000000  # bytes, of all images of its replays
 MOST_TRIALS = 1000  # of a bag
 NICENESS = 10
 _KINDS = {int(kind): kind for kind in EventKind}
@@ -90,8 +99,21 @@ def reply_of(text: bytes) -> BagReply:
     return BagReply(
         [ReadTrial(node, _summary(fields)) for node, fields in data['trials']],
         [Event(_KINDS.get(kind, kind), *others) for kind, *others in data['events']],
-        RecordedMachines(containers, frames),
+        RecordedMachines(containers, frames, [_replay(*fields) for fields in data['replays']]),
         data['problem'],
+    )
+
+
+def _replay(
+    trial_id: str, seq: int, at_s: float, seconds: float, images: List[Any], joints: List[Any]
+) -> RecordedReplay:
+    return RecordedReplay(
+        trial_id,
+        seq,
+        at_s,
+        seconds,
+        [ReplayImage(*fields, base64.b64decode(data)) for *fields, data in images],
+        [ReplayJoints(*fields) for fields in joints],
     )
 
 
@@ -139,6 +161,7 @@ def read(request: BagRequest) -> Dict[str, Any]:
         'events': [],
         'containers': {},
         'frames': [],
+        'replays': [],
         'problem': '',
     }
     if request.shown_events:
@@ -168,7 +191,22 @@ def _replayed(request: BagRequest, by_trial: Dict[str, Dict[int, Event]]) -> Dic
             [*image[:3], base64.b64encode(image.data).decode()]
             for image in _bounded(machines.frames)
         ],
+        'replays': list(_replays(machines.replays, request.trials[0])),
     }
+
+
+def _replays(replays: Sequence[RecordedReplay], trial_id: str) -> Iterator[List[Any]]:
+    """Those of a trial, of all images the first ones."""
+    size = 0
+    for replay in replays:
+        if replay.trial_id != trial_id:
+            continue
+        images = []
+        for image in replay.images:
+            size += len(image.data)
+            if size <= MOST_REPLAYED:
+                images.append([*image[:-1], base64.b64encode(image.data).decode()])
+        yield [*replay[:4], images, replay.joints]
 
 
 def _event(event: Event) -> List[Any]:
@@ -188,7 +226,7 @@ def _shortened(events: Sequence[Event]) -> List[Event]:
 
 def _machines(paths: Sequence[str]) -> Tuple[RecordedMachines, str]:
     """The machines of some bags, and why those of one cannot be read."""
-    found = RecordedMachines({}, [])
+    found = RecordedMachines({}, [], [])
     problem = ''
     for path in paths:
         try:
@@ -199,6 +237,7 @@ def _machines(paths: Sequence[str]) -> Tuple[RecordedMachines, str]:
             continue
         found.containers.update(machines.containers)
         found.frames.extend(machines.frames)
+        found.replays.extend(machines.replays)
     return found, problem
 
 

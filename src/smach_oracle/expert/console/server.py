@@ -81,7 +81,7 @@ def make_app(
 ) -> tornado.web.Application:
     """Return the web application. Its handlers run in the thread of the loop that serves it."""
     shared = SensorRequests(sensors, ages)
-    replayed = ReplayRequests(replays or QuestionReplays())
+    replayed = ReplayRequests((replays or QuestionReplays()).find, history.recorded.find_replay)
     static = {'path': str(STATIC)}
     return tornado.web.Application(
         [

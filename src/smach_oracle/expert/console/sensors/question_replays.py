@@ -42,6 +42,14 @@ SHORTEST_S, LONGEST_S = 1.0, 600.0
 LATE_S = 0.5  # an item may have come so long after the failure
 
 
+_NUMBERS = itertools.count(1)
+
+
+def next_number() -> int:
+    """Return a number by which the page may ask for a replay, whoever keeps it."""
+    return next(_NUMBERS)
+
+
 class KeptReplay(NamedTuple):
     """A replay for the page, and its images."""
 
@@ -59,7 +67,6 @@ class QuestionReplays:
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._numbers = itertools.count(1)
         self._kept: 'OrderedDict[int, KeptReplay]' = OrderedDict()
         self._number_of: Dict[Tuple[str, str], int] = {}  # by robot and query id
         self._topics = RobotTopics(
@@ -95,7 +102,7 @@ class QuestionReplays:
         if not (kept.view['frames'] or kept.view['joints'] or kept.view['events']):
             return
         with self._lock:
-            replay = next(self._numbers)
+            replay = next_number()
             before = self._number_of.pop((robot, message.query_id), None)
             if before is not None:
                 del self._kept[before]

@@ -3,13 +3,14 @@
 import asyncio
 import json
 from concurrent.futures import ThreadPoolExecutor
+from typing import Callable, Optional
 
 import tornado.web
 
 from ..web.access import ClientRateLimits
 from ..web.handlers import PathOnlyHandler
 from .images import USUAL_WIDTH, encode_image
-from .question_replays import KeptReplay, QuestionReplays
+from .question_replays import KeptReplay
 
 RATE, BURST = 60.0, 300.0  # images a second of one address
 
@@ -17,8 +18,9 @@ RATE, BURST = 60.0, 300.0  # images a second of one address
 class ReplayRequests:
     """The objects that all requests for replays share."""
 
-    def __init__(self, replays: QuestionReplays) -> None:
-        self.replays = replays
+    def __init__(self, *finders: Callable[[int], Optional[KeptReplay]]) -> None:
+        """`finders`: each gives what one keeps under a number. They must not wait."""
+        self.finders = finders
         self.limits = ClientRateLimits(rate=RATE, burst=BURST, for_all=3.0)
         self.workers = ThreadPoolExecutor(1, 'replays')
 
@@ -31,10 +33,11 @@ class _ReplayBase(PathOnlyHandler):
 
         :raises tornado.web.HTTPError: 404 where it is not kept any more.
         """
-        replay = self._shared.replays.find(int(number))
-        if replay is None:
-            raise tornado.web.HTTPError(404)
-        return replay
+        for find in self._shared.finders:
+            replay = find(int(number))
+            if replay is not None:
+                return replay
+        raise tornado.web.HTTPError(404)
 
 
 class ReplayHandler(_ReplayBase):

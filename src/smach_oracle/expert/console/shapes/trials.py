@@ -140,3 +140,4 @@ class RecordedTrialView(TypedDict):
     events: List[TrialEventView]
     graphs: ByPath[GraphView]
     images: Dict[str, List[KeptImageView]]  # by the id of a question
+    replays: Dict[str, int]  # by the number of a failure's event: GET /replay/NUMBER

@@ -42,7 +42,7 @@ MOST_EVENTS = 200000  # in a bag
 SHOWN_TRIALS = 300
 SHOWN_BROKEN = 50
 MOST_BAGS_OF_A_TRIAL = 20  # the newest that were read
-MOST_REPLY = 64 * 10**6  # bytes, of all that is replayed of a trial
+MOST_REPLY = 80 * 10**6  # bytes, of all that is replayed of a trial
 BEING_WRITTEN_S = 60.0
 
 

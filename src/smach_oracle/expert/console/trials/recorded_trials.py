@@ -4,7 +4,7 @@ import json
 import threading
 import time
 from collections import OrderedDict
-from typing import Dict, List, Sequence, Set, Tuple
+from typing import Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 from sensor_msgs.msg import CompressedImage
 
@@ -17,6 +17,8 @@ from smach_oracle.ros.log.said_once import warn_once
 from ..feeds.views import event_view
 from ..graphs.layout_worker import LayoutWorker
 from ..sensors.question_images import ImageStore, image_view, stored_images
+from ..sensors.question_replays import KeptReplay, next_number
+from ..sensors.recorded_replays import recorded_replays
 from ..shapes.basics import ByPath
 from ..shapes.questions import KeptImageView
 from ..shapes.trials import RecordedTrialView
@@ -29,6 +31,13 @@ MOST_BYTES = 20000000  # of what is sent
 ImagesByQuestion = Dict[str, List[KeptImageView]]
 
 
+class _Remembered(NamedTuple):
+    """A trial that was opened."""
+
+    text: str
+    replays: Dict[int, KeptReplay]  # by number
+
+
 class RecordedTrials:
     """Reads trials of bags. The last few are remembered. Any thread may use it."""
 
@@ -37,10 +46,11 @@ class RecordedTrials:
         self._layouts = layouts
         self._files = files
         self._lock = threading.Lock()
-        self._known: 'OrderedDict[Tuple[int, Tuple[str, ...]], str]' = OrderedDict()
+        self._known: 'OrderedDict[Tuple[int, Tuple[str, ...]], _Remembered]' = OrderedDict()
+        self._replays: Dict[int, KeptReplay] = {}  # of all that are remembered
 
     def text(self, number: int) -> str:
-        """The trial of that number as JSON: `events`, `graphs` by path, `images` by query id.
+        """The trial of that number as JSON: RecordedTrialView.
 
         :raises RecordedTrialError: where it cannot be had.
         """
@@ -48,17 +58,27 @@ class RecordedTrials:
             trial = self._catalogue.find(number)
             key = (number, trial.summary.bags)
             if key not in self._known:
-                text = json.dumps(self._content(trial), allow_nan=False)
+                content, replays = self._content(trial)
+                text = json.dumps(content, allow_nan=False)
                 if len(text) > MOST_BYTES:
                     raise RecordedTrialError(
                         'The trial is too large to be shown: {:.0f} MB.'.format(len(text) / 1e6)
                     )
-                self._known[key] = text
+                self._known[key] = _Remembered(text, replays)
                 while len(self._known) > REMEMBERED:
                     self._known.popitem(last=False)
-            return self._known[key]
+                self._replays = {
+                    replay: kept
+                    for each in self._known.values()
+                    for replay, kept in each.replays.items()
+                }
+            return self._known[key].text
 
-    def _content(self, trial: BagTrial) -> RecordedTrialView:
+    def find_replay(self, replay: int) -> Optional[KeptReplay]:
+        """Return a replay of a trial that is remembered. It waits for nothing that is read."""
+        return self._replays.get(replay)
+
+    def _content(self, trial: BagTrial) -> Tuple[RecordedTrialView, Dict[int, KeptReplay]]:
         read = self._catalogue.replayed(trial, MOST_EVENTS)
         if read.problem:
             warn_once('Machines in {} cannot be read: {}'.format(trial.summary.bags, read.problem))
@@ -67,13 +87,17 @@ class RecordedTrials:
             path: containers.get(path) or graph_from_events(path, events)
             for path in sorted({event.path for event in events if event.path})[:200]
         }
-        return {
+        by_failure = recorded_replays(read.machines.replays)
+        numbers = {seq: next_number() for seq in by_failure}
+        view: RecordedTrialView = {
             'events': [event_view(event) for event in events],
             'graphs': self._graphs(structures),
             'images': self._images(
                 read.machines.frames, {event.query_id for event in events if event.query_id}
             ),
+            'replays': {str(seq): replay for seq, replay in numbers.items()},
         }
+        return view, {numbers[seq]: kept for seq, kept in by_failure.items()}
 
     def _images(self, frames: Sequence[FailureImage], questions: Set[str]) -> ImagesByQuestion:
         """Images by query id."""

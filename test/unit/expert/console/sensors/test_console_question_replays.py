@@ -150,29 +150,28 @@ class Requests(console_case.ConsoleCase):
         cookie, said = self.sign_in('viewer')
         return self.ask(path, Cookie=cookie, X_Xsrf=said['xsrf'])
 
+    def kept(self, message):
+        """The number of a message that is kept."""
+        self.replays.keep('/alpha', message)
+        return section(self.replays, listed())[listed().key]
+
     def test_a_page_gets_facts_and_images(self):
-        self.replays.keep('/alpha', replay_message(images=((0, -2.0), (1, -1.0))))
-        answer = self.look('/replay/1')
+        path = '/replay/{}'.format(self.kept(replay_message(images=((0, -2.0), (1, -1.0)))))
+        answer = self.look(path)
         assert answer.code == 200
         assert json.loads(answer.body)['frames'] == [[0, -2.0], [1, -1.0]]
-        image = self.look('/replay/1/1')
+        image = self.look(path + '/1')
         assert (image.code, image.headers['Content-Type']) == (200, 'image/jpeg')
         assert image.body != JPEG, "none of a robot's bytes reaches a browser"
         assert cv2.imdecode(np.frombuffer(image.body, np.uint8), 1).shape == (24, 32, 3)
 
     def test_what_is_not_there_or_cannot_be_shown_is_refused(self):
-        self.replays.keep('/alpha', replay_message(data=b'<script>'))
+        number = self.kept(replay_message(data=b'<script>'))
         codes = {
-            path: self.look(path).code
-            for path in ('/replay/2', '/replay/1/1', '/replay/1/0', '/replay/1?x=1', '/replay/x')
+            path: self.look('/replay/' + path.format(number)).code
+            for path in ('99999', '{}/1', '{}/0', '{}?x=1', 'x')
         }
-        assert codes == {
-            '/replay/2': 404,
-            '/replay/1/1': 404,
-            '/replay/1/0': 422,
-            '/replay/1?x=1': 400,
-            '/replay/x': 404,
-        }
+        assert codes == {'99999': 404, '{}/1': 404, '{}/0': 422, '{}?x=1': 400, 'x': 404}
 
     def test_nobody_gets_one_without_signing_in(self):
         self.replays.keep('/alpha', replay_message())

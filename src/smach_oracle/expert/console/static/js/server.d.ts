@@ -528,6 +528,8 @@ export interface RecordedTrial {
   events: TrialEvent[];
   graphs: ByPath<Graph>;
   images: { [name: string]: KeptImage[] | undefined }; // by the id of a question
+  // by the number of a failure's event: GET /replay/NUMBER
+  replays: { [name: string]: number | undefined };
 }
 
 // --- sensors

@@ -2,7 +2,7 @@
 // What is seen beside the controls of a hand: cameras side by side, and the robot in 3D. The
 // likeliest of the robot's own cameras is there from the beginning. Views of others are shown to
 // who chooses them, and never remembered.
-import { h } from '../page/dom.js';
+import { h, pick } from '../page/dom.js';
 import { breakable } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
@@ -78,11 +78,10 @@ export class DriveViews {
       h('div', { class: 'row wrap', role: 'group', 'aria-label': 'Views' }, own.length
         ? own.map((each) => this.button(each, topics.includes(each.topic)))
         : h('span', { class: 'dim' }, NONE)),
-      h('select', { 'aria-label': OTHERS, hidden: !others.length, onchange: ({ target }) => {
-        if (target instanceof HTMLSelectElement) this.turn(target.value);
-      } }, h('option', { value: '', selected: true }, OTHERS), others.map(({ topic }) => (
-        h('option', { key: topic, value: topic },
-          (topics.includes(topic) ? 'Close ' : '') + topic))))),
+      pick({ 'aria-label': OTHERS, hidden: !others.length }, [['', OTHERS],
+        ...others.map(({ topic }) => /** @type {[string, string]} */ (
+          [topic, (topics.includes(topic) ? 'Close ' : '') + topic]))], '',
+      (topic) => this.turn(topic))),
     h('p', { class: 'warn-note', hidden: !foreign.length }, NOT_ITS_OWN + foreign.join(', ')),
     this.stage);
     this.open(looked);

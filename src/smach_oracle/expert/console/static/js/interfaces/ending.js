@@ -2,7 +2,7 @@
 // How an interface ends: the outcome of the state whose work it did, and the reply of the robot.
 import { successOf } from '../answering/outcome_choices.js';
 import { NoReply, unlessLost } from '../page/connection.js';
-import { h, setText } from '../page/dom.js';
+import { h, pick, setText } from '../page/dom.js';
 
 const UNKNOWN = 'No reply came: whether it was carried out is not known.';
 const LOST = 'The connection was lost before the robot had confirmed; try again.';
@@ -10,9 +10,8 @@ const LOST = 'The connection was lost before the robot had confirmed; try again.
 /** @param {server.Question} question */
 export function outcomeChoice({ supersede }) {
   const done = successOf(supersede);
-  return h('select', { 'aria-label': 'Outcome' }, supersede.map((choice) => (
-    h('option', { value: choice.outcome, selected: choice === done },
-      choice.outcome + ' → ' + choice.target))));
+  return pick({ 'aria-label': 'Outcome' }, supersede.map(({ outcome, target }) => (
+    [outcome, outcome + ' → ' + target])), done?.outcome || '', () => {});
 }
 
 /** @param {HTMLSelectElement} choice */

@@ -104,6 +104,20 @@ export function h(tag, properties, ...children) {
 }
 
 /**
+ * A choice of one value.
+ * @param {page.Properties} properties
+ * @param {[value: string, words: string | undefined][]} options
+ * @param {string} chosen
+ * @param {(value: string) => void} choose
+ */
+export function pick(properties, options, chosen, choose) {
+  return h('select', { ...properties, onchange: ({ target }) => {
+    if (target instanceof HTMLSelectElement) choose(target.value);
+  } }, options.map(([value, words]) => (
+    h('option', { key: value, value, selected: value === chosen }, words))));
+}
+
+/**
  * An element of a drawing.
  * @template {keyof SVGElementTagNameMap} Tag
  * @param {Tag} tag

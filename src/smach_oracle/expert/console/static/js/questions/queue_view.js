@@ -2,7 +2,7 @@
 // The cards of the queue, and the tools to sort, filter and search them.
 import { waits } from '../page/alerts.js';
 import { wasMeant } from '../page/deliberate.js';
-import { h } from '../page/dom.js';
+import { h, pick } from '../page/dom.js';
 import {
   FAILURE_CLASSES, breakable, chip, counted, percent, rateBar, robotMark, since, until,
 } from '../page/format.js';
@@ -26,8 +26,10 @@ export class QueueTools {
   /** @param {() => void} changed */
   constructor(changed) {
     const order = remembered('queue-order', 'oldest');
-    this.order = choiceOf('Order', ORDERS, order, changed);
-    this.filter = choiceOf('Which ones', FILTERS, 'all', changed);
+    this.order = pick({ 'aria-label': 'Order', title: 'Order' }, Object.entries(ORDERS), order,
+      changed);
+    this.filter = pick({ 'aria-label': 'Which ones', title: 'Which ones' },
+      Object.entries(FILTERS), 'all', changed);
     this.search = h('input', { type: 'search', placeholder: 'Search', 'aria-label': 'Search',
       class: 'queue-search', oninput: changed });
     this.together = h('input', { type: 'checkbox', onchange: changed });
@@ -61,17 +63,6 @@ export class QueueTools {
     this.search.value = '';
     this.filter.value = 'all';
   }
-}
-
-/**
- * @param {string} title
- * @param {{ [value: string]: string }} words
- * @param {string} value
- * @param {() => void} onchange
- */
-function choiceOf(title, words, value, onchange) {
-  return h('select', { 'aria-label': title, title, onchange }, Object.keys(words).map((each) => (
-    h('option', { value: each, selected: each === value }, words[each]))));
 }
 
 /**

@@ -1,7 +1,7 @@
 // @ts-check
 // The robot's cameras beside a question: what they gave at the failure, and live once somebody
 // wants it. Side by side; on a phone one or the other.
-import { h } from '../page/dom.js';
+import { h, pick } from '../page/dom.js';
 import { keep, render } from '../page/redraw.js';
 import { CameraView } from '../sensors/camera_view.js';
 import { FailureImageView } from '../sensors/failure_image_view.js';
@@ -65,11 +65,11 @@ export class SituationCamera {
         h('div', { class: 'row pane-tabs', role: 'group', 'aria-label': 'Which image' },
           this.tab('then', 'At the failure'), this.tab('now', 'Live')),
         h('span', { class: 'spacer' }),
-        h('select', { 'aria-label': 'Camera', hidden: topics.length < 2, onchange: ({ target }) => {
-          if (target instanceof HTMLSelectElement) this.topic = target.value;
-          this.draw();
-        } }, topics.map((topic) => h('option', { key: topic, value: topic,
-          selected: topic === this.topic }, topic))),
+        pick({ 'aria-label': 'Camera', hidden: topics.length < 2 },
+          topics.map((topic) => [topic, topic]), this.topic, (topic) => {
+            this.topic = topic;
+            this.draw();
+          }),
         h('button', { class: 'tool', type: 'button', 'data-action': 'live-camera', hidden: none,
           'aria-pressed': live, onclick: () => this.setLive(!this.live) },
         live ? 'Stop live' : 'Show live')),

@@ -1,6 +1,6 @@
 // @ts-check
 // What may be changed in the store of a machine that is down, before it goes on.
-import { h, toast } from '../page/dom.js';
+import { h, pick, toast } from '../page/dom.js';
 import { render } from '../page/redraw.js';
 
 const NEEDS_ROLE = 'To change it needs the role of an operator.';
@@ -46,11 +46,11 @@ export class DownChanges {
     return h('section', { class: 'down-changes', 'aria-label': 'Change it' },
       h('form', { class: 'row wrap', onsubmit: (event) => this.goTo(event) },
         h('span', {}, 'Go on at'),
-        h('select', { 'aria-label': 'State at which it goes on', onchange: ({ target }) => {
-          if (target instanceof HTMLSelectElement) this.label = target.value;
-          this.draw();
-        } }, states.map((value) => (
-          h('option', { key: value, value, selected: value === label }, value)))),
+        pick({ 'aria-label': 'State at which it goes on' }, states.map((each) => [each, each]),
+          label, (chosen) => {
+            this.label = chosen;
+            this.draw();
+          }),
         this.button('goto-stored', 'Go on there', may && states.length > 0,
           { 'data-deliberate': 'goto_stored ' + at + ' ' + label })),
       h('form', { class: 'row wrap', onsubmit: (event) => this.edit(event) },

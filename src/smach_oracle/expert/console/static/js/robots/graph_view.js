@@ -41,9 +41,7 @@ export class GraphView {
     /** @type {SVGGElement | null} */
     this.oracle = null;
     /** @type {GraphViewport} */
-    this.viewport = new GraphViewport(this.drawing, this.root, () => this.focus,
-      (on) => this.followButton.setAttribute('aria-pressed', String(on)),
-      (seen) => this.map.show(seen, this.viewport.size));
+    this.viewport = new GraphViewport(this);
     this.viewport.setFollow(true);
     takeGraphKeys(this.drawing, this.viewport);
   }

@@ -14,19 +14,9 @@ const SMALLEST = 0.08;
 const LARGEST = 3;
 
 export class GraphViewport {
-  /**
-   * @param {SVGSVGElement} drawing
-   * @param {HTMLElement} root the frame around it
-   * @param {() => Place} focusOf what should be in view where not all can be
-   * @param {(on: boolean) => void} onFollow
-   * @param {(seen: Seen) => void} onSeen
-   */
-  constructor(drawing, root, focusOf, onFollow, onSeen) {
-    this.drawing = drawing;
-    this.root = root;
-    this.focusOf = focusOf;
-    this.onFollow = onFollow;
-    this.onSeen = onSeen;
+  /** @param {import('./graph_view.js').GraphView} graph that it is the view of */
+  constructor(graph) {
+    this.graph = graph;
     /** @type {Size | null} */
     this.size = null;
     this.view = { x: 0, y: 0, scale: 1 };
@@ -36,15 +26,15 @@ export class GraphViewport {
     this.pointers = new Map();
     this.spread = 0; // px between two fingers
     this.listen();
-    new ResizeObserver(() => this.place()).observe(root);
+    new ResizeObserver(() => this.place()).observe(graph.root);
   }
 
-  get box() { return this.root.getBoundingClientRect(); }
+  get box() { return this.graph.root.getBoundingClientRect(); }
 
   /** @param {boolean} on */
   setFollow(on) {
     this.follow = on;
-    this.onFollow(on);
+    this.graph.followButton.setAttribute('aria-pressed', String(on));
     if (on) this.place();
   }
 
@@ -74,7 +64,7 @@ export class GraphViewport {
   showFocus({ width, height }, box) {
     const room = box.width - 2 * MARGIN;
     const scale = Math.max(SMALLEST_READABLE, Math.min(1, room / width));
-    const [x, y] = this.focusOf();
+    const [x, y] = this.graph.focus;
     const [seenWidth, seenHeight] = [box.width / scale, box.height / scale];
     this.view = { scale,
       x: width * scale > room ? x - seenWidth / 2 : (width - seenWidth) / 2,
@@ -97,8 +87,8 @@ export class GraphViewport {
     const { box } = this;
     const { x, y, scale } = this.view;
     const [width, height] = [box.width / scale, box.height / scale];
-    this.drawing.setAttribute('viewBox', [x, y, width, height].join(' '));
-    this.onSeen({ x, y, width, height });
+    this.graph.drawing.setAttribute('viewBox', [x, y, width, height].join(' '));
+    this.graph.map.show({ x, y, width, height }, this.size);
   }
 
   /**
@@ -134,7 +124,7 @@ export class GraphViewport {
   }
 
   listen() {
-    const { drawing, pointers } = this;
+    const { graph: { drawing }, pointers } = this;
     drawing.addEventListener('wheel', (event) => {
       event.preventDefault();
       this.zoom(Math.exp(-event.deltaY / 400), this.inFrame(event.clientX, event.clientY));

@@ -1,7 +1,7 @@
 // @ts-check
 // The last seconds before a failure: images frame by frame, what happened, and the joints that
 // moved most. Images come once somebody looks for more than the last one.
-import { h, say } from '../page/dom.js';
+import { h, pick, say } from '../page/dom.js';
 import { keep, render } from '../page/redraw.js';
 import { drawImage, imageCanvas } from './image_canvas.js';
 import { JointPlot, legendOf } from './joint_plot.js';
@@ -68,7 +68,9 @@ export class LastSeconds {
     return h('section', { class: 'card last-seconds' },
       h('div', { class: 'row last-head' },
         h('h3', {}, 'Last ' + this.length + ' s before the failure'),
-        h('span', { class: 'spacer' }), this.cameraChoice()),
+        h('span', { class: 'spacer' }),
+        pick({ 'aria-label': 'Camera of the replay', hidden: this.seen.length < 2 },
+          this.seen.map((each) => [each, each]), this.camera, (each) => this.chooseCamera(each))),
       h('div', { class: 'last-stage' }, keep(this.screen),
         h('div', { class: 'last-joints', hidden: !joints.length, '--at': this.share(t) },
           keep(this.plot.canvas), legendOf(joints.map(({ name }) => name)))),
@@ -83,15 +85,6 @@ export class LastSeconds {
         playButton('▸|', 'To the failure', 'last', () => this.seek(0)),
         h('span', { class: 'spacer' }), h('span', { class: 'number last-time' }, when)),
       h('p', { class: 'last-words' }, events[latestAt(events, t)]?.words));
-  }
-
-  cameraChoice() {
-    const { camera: shown, seen } = this;
-    return h('select', { 'aria-label': 'Camera of the replay', hidden: seen.length < 2,
-      onchange: ({ target }) => {
-        if (target instanceof HTMLSelectElement) this.chooseCamera(target.value);
-      } }, seen.map((camera) => h('option', { key: camera, value: camera,
-      selected: camera === shown }, camera)));
   }
 
   /** The cameras that gave an image. */

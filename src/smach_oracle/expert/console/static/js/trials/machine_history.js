@@ -76,7 +76,8 @@ export class MachineHistory {
 
 /** @returns {replay.Snapshot} */
 function beginning() {
-  return { active: {}, asked: {}, latest: {}, failed: {}, rates: {}, taken: {}, question: null };
+  return { active: {}, asked: {}, latest: {}, failed: {}, rates: {}, taken: {}, failure: -1,
+    question: null };
 }
 
 /**
@@ -86,7 +87,8 @@ function beginning() {
 function take(now, event) {
   const { kind, path, state, target } = event;
   if (kind === 'trial_start') {
-    Object.assign(now, { active: {}, asked: {}, latest: {}, failed: {}, question: null });
+    Object.assign(now, { active: {}, asked: {}, latest: {}, failed: {}, failure: -1,
+      question: null });
   } else if (kind === 'trial_end') {
     Object.assign(now, { active: {}, asked: {}, failed: {} });
   } else if (kind === 'state_start') {
@@ -121,11 +123,12 @@ function takeTransition(now, { path, state, outcome, target, counted }) {
  * @param {replay.Snapshot} now
  * @param {server.TrialEvent} event
  */
-function takeFailure(now, { path, state, rate, class: rank }) {
+function takeFailure(now, { seq, path, state, rate, class: rank }) {
   const learned = rateOf(now, path, state);
   learned.failures += 1;
   learned.rate = rate;
   learned.class = rank;
+  now.failure = seq;
   now.question = null;
   now.failed[path] = { state };
   now.asked[path] = true;

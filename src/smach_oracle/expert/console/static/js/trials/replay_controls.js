@@ -1,6 +1,6 @@
 // @ts-check
 // The buttons of a replay.
-import { h } from '../page/dom.js';
+import { h, pick } from '../page/dom.js';
 import { playButton as button, playOrPause } from '../sensors/play_buttons.js';
 
 const SPEEDS = [0.25, 1, 4, 16, 64, 256];
@@ -16,10 +16,10 @@ export function replayControls(replay, time) {
     playOrPause(replay.playing, () => replay.toggle()),
     button('▸', 'One event on', 'on', () => replay.step(1)),
     button('▸|', 'To the end', 'last', () => replay.to(replay.last)),
-    h('select', { class: 'replay-speed', 'aria-label': 'Speed', onchange: ({ target }) => {
-      if (target instanceof HTMLSelectElement) replay.speed = Number(target.value);
-    } }, SPEEDS.map((each) => (
-      h('option', { value: each, selected: each === replay.speed }, each + '×')))),
+    pick({ class: 'replay-speed', 'aria-label': 'Speed' }, SPEEDS.map((each) => (
+      [String(each), each + '×'])), String(replay.speed), (speed) => {
+      replay.speed = Number(speed);
+    }),
     button('−', 'A longer part of the time axis', 'longer', () => replay.timeline.zoom(0.5)),
     button('+', 'A shorter part of the time axis', 'shorter', () => replay.timeline.zoom(2)),
     button('↔', 'The whole time axis', 'whole', () => replay.timeline.zoom(0)),

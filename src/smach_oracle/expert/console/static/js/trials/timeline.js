@@ -8,12 +8,7 @@ import { MARKS, laneOf, lanesOf, questionBars, stateBars, ticks } from './time_a
 
 /** @typedef {{ left: number, right: number, begin: number, whole: number }} Scale px and s */
 /** @typedef {{ from: number, to: number }} Part of the axis, s since the epoch */
-/**
- * @typedef {object} Use
- * @property {(seq: number) => void} onPick an event was chosen
- * @property {(t: number) => void} onSeek a time was
- * @property {(event: KeyboardEvent) => void} onKey a key, while the cursor has the focus
- */
+/** @typedef {Pick<import('./trial_replay.js').TrialReplay, 'pick' | 'seek' | 'key'>} Replay */
 
 const LANE = 26; // px high
 const NAME = 168; // px wide, at most
@@ -24,17 +19,17 @@ const NARROWEST = 50;
 const SHORTEST_S = 0.5; // that the axis may show
 
 export class Timeline {
-  /** @param {Use} use */
-  constructor({ onPick, onSeek, onKey }) {
-    this.onPick = onPick;
-    this.onSeek = onSeek;
+  /** @param {Replay} replay that it is a part of */
+  constructor(replay) {
+    this.replay = replay;
     this.cursor = h('div', { class: 'cursor-line' });
     this.lanes = h('div', {});
     this.canvas = h('div', { class: 'timeline-canvas' }, this.lanes, this.cursor);
     this.handle = h('div', { class: 'cursor-handle' });
     this.axis = h('div', { class: 'axis' });
     this.slider = h('div', { class: 'cursor-rail', role: 'slider', tabindex: '0',
-      'aria-label': 'Time in the trial', 'aria-valuemin': 0, onkeydown: onKey },
+      'aria-label': 'Time in the trial', 'aria-valuemin': 0, 
+      onkeydown: (event) => replay.key(event) },
     this.axis, this.handle);
     this.root = h('div', { class: 'timeline' }, this.slider, this.canvas);
     /** @type {server.TrialEvent[]} */
@@ -92,7 +87,7 @@ export class Timeline {
     if (!this.scale) return;
     const { left, right, begin, whole } = this.scale;
     const share = (this.xOf(event) - left) / (right - left);
-    this.onSeek(begin + whole * Math.min(1, Math.max(0, share)));
+    this.replay.seek(begin + whole * Math.min(1, Math.max(0, share)));
   }
 
   /**
@@ -277,7 +272,7 @@ export class Timeline {
     return looks && svg('circle', { key: seq,
       class: 'mark ' + looks + (seq === this.picked ? ' picked' : ''),
       cx: this.x(t), cy: this.y(laneOf(event)) + LANE / 2, r: 4.5, 'data-seq': seq,
-      onclick: () => this.onPick(seq) }, svg('title', {}, words));
+      onclick: () => this.replay.pick(seq) }, svg('title', {}, words));
   }
 }
 

@@ -1,6 +1,6 @@
 // @ts-check
 // The trials to choose from: those that this server has heard of, then those of bags, by days.
-import { h } from '../page/dom.js';
+import { h, pick } from '../page/dom.js';
 import { chip, clock, counted, duration } from '../page/format.js';
 import { redrawWith } from '../page/redraw.js';
 
@@ -48,9 +48,8 @@ export class TrialList {
   constructor(onChoose, onFilter) {
     this.onChoose = onChoose;
     this.list = h('div', { class: 'trial-list', role: 'group', 'aria-label': 'Trials' });
-    this.filter = h('select', { class: 'trial-filter', 'aria-label': 'Which trials are listed',
-      onchange: onFilter }, Object.entries(FILTERS).map(([name, filter]) => (
-      h('option', { value: name }, filter?.title))));
+    this.filter = pick({ class: 'trial-filter', 'aria-label': 'Which trials are listed' },
+      Object.entries(FILTERS).map(([name, filter]) => [name, filter?.title]), 'all', onFilter);
     this.root = h('div', { class: 'trial-side' }, this.filter, this.list);
   }
 

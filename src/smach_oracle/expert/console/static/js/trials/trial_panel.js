@@ -199,14 +199,15 @@ class TrialPanel {
   /**
    * What is beside the events of a trial.
    * @param {server.Trial} trial
-   * @returns {Pick<replay.ReplayedTrial, 'graph' | 'images'>}
+   * @returns {Pick<replay.ReplayedTrial, 'graph' | 'images' | 'replays'>}
    */
   recording({ robot }) {
     const { store } = this.app;
     const { opened } = this.recorded;
     if (!this.bag || !opened) {
-      return { graph: (path) => store.get(`graph ${robot} ${path}`), images: {} };
+      return { graph: (path) => store.get(`graph ${robot} ${path}`), images: {}, replays: {} };
     }
-    return { graph: (path) => opened.graphs[path], images: opened.images };
+    const { images, replays } = opened;
+    return { graph: (path) => opened.graphs[path], images, replays };
   }
 }

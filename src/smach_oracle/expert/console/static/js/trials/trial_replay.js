@@ -1,19 +1,21 @@
 // @ts-check
 // One trial, to be replayed: a cursor on its time axis, the machine as it stood then, and what
 // happened in words.
-import { h, modified, setText, typing } from '../page/dom.js';
+import { h, modified, pick, setText, typing } from '../page/dom.js';
 import { added, chip } from '../page/format.js';
 import { keep, render } from '../page/redraw.js';
 import { MachineView } from '../robots/machine_view.js';
 import { MachineHistory, activePath, machineStateOf } from './machine_history.js';
 import { replayControls } from './replay_controls.js';
+import { FailureSeconds } from './failure_seconds.js';
 import { ReplayQuestion } from './replay_question.js';
 import { Timeline } from './timeline.js';
 
 const ROBOT = 'replayed'; // stands for the trial's robot in the ids of its states
 const FOLLOW = 'follow what is active';
 /** @type {replay.ReplayedTrial} */
-const NOTHING = { id: '', events: [], end: 0, running: false, graph: () => undefined, images: {} };
+const NOTHING = { id: '', events: [], end: 0, running: false, graph: () => undefined, images: {},
+  replays: {} };
 
 export class TrialReplay {
   /**
@@ -35,17 +37,18 @@ export class TrialReplay {
     this.chosen = ''; // path of a container
     /** @type {machine.MachineState} */
     this.state = { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
-    this.timeline = new Timeline({ onSeek: (t) => this.seek(t), onPick: (seq) => this.pick(seq),
-      onKey: (event) => this.key(event) });
+    this.timeline = new Timeline(this);
     this.controls = h('div', {});
     /** @type {machine.MachineSource} */
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
     this.view = new MachineView(source, (path) => this.open(path));
     this.words = h('p', { class: 'replay-words', role: 'status' });
     this.question = new ReplayQuestion(app);
+    this.lastSeconds = new FailureSeconds(app);
     this.stage = h('div', {});
     this.root = h('div', { class: 'replay', onkeydown: (event) => this.keyOutside(event) },
-      this.controls, this.timeline.root, this.words, this.question.root, this.stage);
+      this.controls, this.timeline.root, this.words, this.question.root,
+      this.lastSeconds.root, this.stage);
   }
 
   /** Index of the last event. */
@@ -138,13 +141,14 @@ export class TrialReplay {
   }
 
   draw() {
-    const { events, graph, images } = this.trial;
+    const { events, graph, images, replays } = this.trial;
     const now = this.history.at(Math.max(0, this.index));
     const event = events[Math.max(0, this.index)];
     const paths = [...new Set(events.map((each) => each.path))].filter(Boolean).sort();
     this.state = machineStateOf(now, paths, (path) => graph(path)?.oracle || 'ORACLE');
     const active = activePath(now);
     this.question.show(now.question, (now.question && images[now.question.query]) || []);
+    this.lastSeconds.show(replays[now.failure]);
     const deepest = active.length ? active[active.length - 1][0] : event.path;
     const usual = graph(deepest) || !graph(event.path) ? deepest : event.path;
     const shown = paths.includes(this.chosen) ? this.chosen : usual;
@@ -165,11 +169,9 @@ export class TrialReplay {
           chip(label, failed[path] ? 'bad' : 'accent', path + '/' + label)]),
         !active.length && h('span', { class: 'dim' }, 'Nothing is active.')),
       h('span', { class: 'spacer' }),
-      h('select', { class: 'replay-container', 'aria-label': 'Machine that is shown',
-        title: shown, hidden: paths.length < 2, onchange: ({ target }) => {
-          if (target instanceof HTMLSelectElement) this.open(target.value);
-        } }, ['', ...paths].map((path) => h('option', { key: path, value: path,
-        selected: path === this.chosen }, path || FOLLOW)))),
+      pick({ class: 'replay-container', 'aria-label': 'Machine that is shown', title: shown,
+        hidden: paths.length < 2 }, ['', ...paths].map((path) => [path, path || FOLLOW]),
+      this.chosen, (path) => this.open(path))),
     keep(this.view.root));
   }
 

@@ -12,6 +12,7 @@ export interface ReplayedTrial {
   running: boolean; // more is to come
   graph(path: string): Graph | undefined;
   images: { [query: string]: KeptImage[] | undefined }; // what cameras gave at its questions
+  replays: { [seq: string]: number | undefined }; // of what came before its failures
 }
 
 /** How often a transition was taken; from null: the oracle, whose label the graph knows. */
@@ -36,6 +37,7 @@ export interface Snapshot {
   failed: ByPath<{ state: string }>;
   rates: ByPath<ByState<ShownRate>>;
   taken: ByPath<Map<string, Taken>>;
+  failure: number; // of the latest one: the number of its event; -1 before any
   question: AskedQuestion | null;
 }
 
