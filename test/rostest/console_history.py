@@ -198,7 +198,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         )
         self.assertTrue(browser.says('before the failure', '.replay .last-seconds h3'))
         self.assertTrue(
-            wait_for(lambda: browser.run(MIDDLE, '.replay .last-seconds canvas.image')),
+            wait_for(lambda: browser.run(MIDDLE, '.replay .last-seconds canvas.image[data-frame]')),
             'the last seconds, out of the bag',
         )
         slider.send_keys(Keys.PAGE_UP)
