@@ -30,7 +30,7 @@ def recorded_replays(recorded: Sequence[RecordedReplay]) -> Dict[int, KeptReplay
 
 
 def _message(replay: RecordedReplay, so_far: Sequence[RecordedReplay]) -> FailureReplay:
-    """A replay as its robot published it, but for events, which lie next to it in the bag."""
+    """A replay as its robot published it, without the events, which lie next to it in the bag."""
     message = FailureReplay(seconds=replay.seconds)
     message.header.stamp = _time(replay.at_s)
     began_s = replay.at_s - replay.seconds
