@@ -112,7 +112,10 @@ def _replay(
         seq,
         at_s,
         seconds,
-        [ReplayImage(*fields, base64.b64decode(data)) for *fields, data in images],
+        [
+            ReplayImage(topic, came_s, image_format, base64.b64decode(data))
+            for topic, came_s, image_format, data in images
+        ],
         [ReplayJoints(*fields) for fields in joints],
     )
 
@@ -196,7 +199,7 @@ def _replayed(request: BagRequest, by_trial: Dict[str, Dict[int, Event]]) -> Dic
 
 
 def _replays(replays: Sequence[RecordedReplay], trial_id: str) -> Iterator[List[Any]]:
-    """Those of a trial, of all images the first ones."""
+    """The replays of a trial, of all images the first ones."""
     size = 0
     for replay in replays:
         if replay.trial_id != trial_id:
