@@ -154,6 +154,7 @@ class Marking(ConsolePage, unittest.TestCase):
         )
         self.assert_the_object_is_drawn_in_3d('.object-view .cloud')
         self.assert_accessible('a marked object')
+        self.assert_wide_at(1024, '.perception .image', 350)
         browser.click('[data-tool=background]')
         left_top, right_bottom = self.around_the_can()
         self.drag(left_top, (right_bottom[0], left_top[1]))

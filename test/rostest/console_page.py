@@ -160,6 +160,16 @@ class ConsolePage:
         with socket.socket() as probe:
             return probe.connect_ex(('127.0.0.1', cls.port)) == 0
 
+    def assert_wide_at(self, width, selector, least):
+        """An element has so many px in a window of that width."""
+        driver, size = self.browser.driver, {'deviceScaleFactor': 1, 'mobile': False}
+        driver.execute_cdp_cmd(
+            'Emulation.setDeviceMetricsOverride', dict(size, width=width, height=768)
+        )
+        wide = 'return document.querySelector(arguments[0]).getBoundingClientRect().width'
+        self.assertGreater(self.browser.run(wide, selector), least)
+        driver.execute_cdp_cmd('Emulation.clearDeviceMetricsOverride', {})
+
     def assert_accessible(self, view):
         """axe-core finds nothing wrong with what the page shows now, in any of its colours."""
         from accessibility import violations

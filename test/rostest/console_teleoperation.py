@@ -147,6 +147,7 @@ class Teleoperation(ConsolePage, unittest.TestCase):
         self.assertTrue(browser.says('You drive.', '.driver'))
         browser.click('[data-frame=base]')
         self.assert_accessible('a hand that is driven')
+        self.assert_wide_at(1024, '.drive-facts dd', 200)
 
     def test_2_a_held_key_moves_the_hand_and_one_that_is_let_go_stops_it(self):
         before = self.height()

@@ -95,12 +95,12 @@ export class ManipulationPanel {
       h('h3', {}, 'Drive the hand for ', this.question.state),
       h('span', { class: 'dim driver', role: 'status' },
         connected ? driver : 'No connection: the hand stands.'),
-      h('span', { class: 'spacer' }),
-      h('button', { class: 'primary wheel', disabled: !may || !now || !connected,
-        'data-deliberate': mine ? null : 'take the wheel', // to leave it is always possible
-        onclick: () => this.turnWheel() }, mine ? 'Leave the wheel' : 'Take the wheel'),
-      h('button', { class: 'stop', 'data-action': 'stop-hand', onclick: () => this.stopHand() },
-        '■ Stop the hand'));
+      h('span', { class: 'spacer' }), h('div', { class: 'row wrap' },
+        h('button', { class: 'primary wheel', disabled: !may || !now || !connected,
+          'data-deliberate': mine ? null : 'take the wheel', // to leave it is always possible
+          onclick: () => this.turnWheel() }, mine ? 'Leave the wheel' : 'Take the wheel'),
+        h('button', { class: 'stop', 'data-action': 'stop-hand',
+          onclick: () => this.stopHand() }, '■ Stop the hand')));
   }
 
   /** Its arms, where the interface offers several, and the frames along whose axes it moves. */

@@ -74,8 +74,9 @@ export class PerceptionPanel {
     const off = { disabled: !this.may || this.busy };
     return h('div', { class: 'perception-head' },
       h('h3', {}, 'Mark the object for ', this.question.state), h('span', { class: 'spacer' }),
-      button('Image of the failure', () => this.useFrame('at_goal'), off),
-      button('New image', () => this.useFrame('fresh'), off));
+      h('div', { class: 'row' },
+        button('Image of the failure', () => this.useFrame('at_goal'), off),
+        button('New image', () => this.useFrame('fresh'), off)));
   }
 
   sideView() {
