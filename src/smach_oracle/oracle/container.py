@@ -182,10 +182,10 @@ class OracleContainer(smach.StateMachine):
         if given:
             marked_node(machine).settings.with_states({label: given})
         more = {} if constants is None else {'constants': constants}
-        added: smach.State = smach.StateMachine.add(label, state, transitions, remapping, **more)
+        smach.StateMachine.add(label, state, transitions, remapping, **more)
         if given:
             marked_node(machine).in_force.give_with_add(label, given)
-        return state if added is None else added
+        return state
 
     # -- what adapters read. See oracle_of
 

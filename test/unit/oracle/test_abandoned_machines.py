@@ -92,7 +92,7 @@ def let_go(deaf):
 @pytest.mark.parametrize('services', [False, True])
 @pytest.mark.parametrize('observed', [False, True])
 @pytest.mark.parametrize('recovering', ['keep', 'override'])
-def test_it_stops_at_its_next_state_boundary(monkeypatch, end, services, observed, recovering):
+def test_it_stops_at_its_next_state_boundary(monkeypatch, log, end, services, observed, recovering):
     deaf, after, repaired = Deaf(end, services=services), Scripted(), Scripted()
     inner = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with inner:
@@ -106,6 +106,7 @@ def test_it_stops_at_its_next_state_boundary(monkeypatch, end, services, observe
     assert (deaf.runs, after.runs, repaired.runs) == (1, 0, 0)
     assert not inner.is_running()
     assert {row.state: row.failures for row in inner.rates()} == {'A': 0, 'B': 0, 'C': 0}
+    assert [level for level, text in log if 'stops, as' in text] == ['warn']
 
 
 def test_the_way_it_has_learned_is_no_longer_taken(monkeypatch):

@@ -315,6 +315,15 @@ def test_it_is_the_authors_where_the_container_has_one_or_where_the_user_says_so
     assert machine.visits() == ['PICK']
 
 
+def test_a_report_is_none_where_the_user_says_so():
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        settings={'states': {'REPORT': {'intended_outcomes': ['said']}}},
+    )
+    assert machine.run() == 'failed'
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT']
+
+
 def test_where_the_author_is_overridden_a_person_is_asked():
     expert = FakeExpert(goto('PICK'))
     machine = ending_neutrally(

@@ -248,6 +248,25 @@ def test_falling_back_to_a_state_has_an_end_when_nobody_ever_answers():
     assert 'gone there 2 times' in machine.of(EventKind.WARNING)[-1].text
 
 
+def test_a_state_that_is_never_repeated_falls_back_to_another_one_once():
+    machine = watched(
+        Scripted(*['aborted'] * 100), settings={'on_no_answer': 'goto:A', 'max_recoveries': 0}
+    )
+    assert machine.run() == 'aborted'
+    assert machine.visits() == ['A', 'A']
+
+
+def test_at_the_deadline_itself_nobody_is_asked_again(clock):
+    def too_late_and_unfit(question, cancelled, progress):
+        clock.advance(question.deadline_s)
+        return goto('NOWHERE')
+
+    machine, expert = asking(too_late_and_unfit, goto('C'), deadline_s=8.0)
+    assert machine.run() == 'aborted'
+    assert len(expert.questions) == 1
+    assert len(machine.of(EventKind.QUERY_EXPIRED)) == 1
+
+
 def test_an_expert_who_sleeps_past_the_deadline_is_taken_the_question_from(monkeypatch):
     monkeypatch.setattr(inquiry, '_OVERTIME_S', 0.1)
     machine, _ = asking(waits, deadline_s=0.1)

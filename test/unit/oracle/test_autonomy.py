@@ -1,5 +1,7 @@
 """The autonomy of states: run, announce, confirm; by settings and at run time."""
 
+from typing import List, Optional
+
 import pytest
 from fake_clock import FakeClock
 from held_machines import Gate, Held, eventually
@@ -11,7 +13,8 @@ from smach_oracle.oracle.control.control import Control, HeldPlace, LetGo
 from smach_oracle.oracle.errors import OperatorError, SettingsError
 from smach_oracle.oracle.operator_hand import ActiveState
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.oracle.scope.scope import Scope
+from smach_oracle.oracle.scope.clock import Flag
+from smach_oracle.oracle.scope.scope import Reason, Scope
 from smach_oracle.oracle.settings.names import PathPattern
 
 
@@ -181,6 +184,35 @@ def test_a_level_that_is_set_just_before_a_wait_begins_counts() -> None:
     control.begin(hold)
     assert not hold.waits_for_confirmation
     assert control.wait(hold, Scope()) is LetGo.RESUMED
+
+
+class PassingScope(Scope):
+    """Has the time pass for which somebody waits, and notes it."""
+
+    waited: List[float] = []
+
+    def wait(self, seconds: Optional[float] = None, until: Optional[Flag] = None) -> bool:
+        """Have it pass."""
+        assert seconds is not None and isinstance(self.clock, FakeClock)
+        self.waited.append(seconds)
+        self.clock.advance(seconds)
+        return True
+
+
+def test_what_waits_while_a_stop_is_under_way_ends_with_it() -> None:
+    """It ends when the stop has had its time, and no later."""
+    clock = FakeClock()
+    control, scope = Control(clock), PassingScope(clock=clock)
+    control.pause('eva')
+    hold = control.hold_before(HeldPlace('TOP', 'A'), False)
+    assert hold is not None
+    control.begin(hold)
+    with control.stop():
+        pass
+    began_s = clock.now()
+    scope.waited = []
+    assert control.wait(hold, scope) is Reason.PREEMPTED
+    assert scope.waited == [clock.now() - began_s] and 0.0 < scope.waited[0] < 10.0
 
 
 def test_after_an_operators_preempt_what_comes_behind_the_clean_up_is_confirmed() -> None:

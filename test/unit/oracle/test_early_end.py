@@ -17,3 +17,13 @@ def test_a_trial_that_is_kept_says_so_unless_it_has_ended_before():
         early.note_shutdown()
     early.keep()
     assert early.why is TrialEnd.SHUTDOWN
+
+
+def test_a_process_that_goes_down_ends_a_stored_trial_before_its_machines_know():
+    for is_stored in (True, False):
+        early = EarlyEnd(Scope())
+        early.begin_trial(is_stored=is_stored)
+        assert not early.end_at_shutdown()
+        early.note_shutdown()
+        assert early.why is None, 'no question is open'
+        assert early.end_at_shutdown() is is_stored

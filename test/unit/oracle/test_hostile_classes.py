@@ -185,3 +185,26 @@ def test_a_state_whose_class_uses_the_names_of_our_marks_runs():
     machine = chain_of(Marked())
     OracleContainer.wrap(machine)
     assert machine.execute() == 'done'
+
+
+class Final(smach.Concurrence):
+    """Executes by itself, and lets nobody extend it."""
+
+    def __init_subclass__(cls, **more):
+        raise TypeError('Final is final')
+
+    def execute(self, *args):
+        return smach.Concurrence.execute(self, *args)
+
+
+def test_states_in_a_container_that_cannot_be_extended_get_no_oracle_and_a_warning_says_so(log):
+    branches = Final(outcomes=['done'], default_outcome='done')
+    with branches:
+        smach.Concurrence.add('A', Scripted('aborted'))
+    machine = smach.StateMachine(outcomes=['done'])
+    with machine:
+        smach.StateMachine.add('ALL', branches)
+    OracleContainer.wrap(machine, name='TOP')
+    assert machine.execute() == 'done'
+    text = 'TOP/ALL: its states get no oracle, since its class cannot be extended (Final is final)'
+    assert ('warn', text) in log

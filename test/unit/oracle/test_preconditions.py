@@ -381,6 +381,23 @@ def test_each_half_of_a_pair_has_the_limit():
     hanging.leave()
 
 
+def test_what_the_second_half_writes_counts_though_the_first_one_still_runs():
+    let_go = threading.Event()
+    check = Scripted(lambda self, ud: 'ok' if let_go.wait(20) else 'aborted')
+
+    def clear(state, ud):
+        ud.cleared = True
+        return 'ok'
+
+    machine = machine_with((check, Scripted(clear, output_keys=['cleared'])), **BRIEF)
+    try:
+        in_thread(machine.run).result()
+    finally:
+        let_go.set()
+    assert ends(machine)[0][1] == 'met'
+    assert machine.machine.userdata.cleared is True
+
+
 def test_a_state_added_with_preconditions_has_them():
     ran = []
     machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'])

@@ -62,3 +62,35 @@ def test_so_has_what_was_unwrapped(make):
 def test_so_has_a_copy():
     machine = OracleContainer.wrap(machine_of(Scripted()))
     assert not shares_its_names(copy.copy(machine))
+
+
+def visited(state):
+    """The view of a state, in a trial of two visits, at its first and at its second visit."""
+    views = []
+    machine = smach.StateMachine(outcomes=['done'])
+    with machine:
+        smach.StateMachine.add('A', state, {'ok': 'B', 'aborted': 'B', 'preempted': 'B'})
+        look = Scripted(
+            lambda self, ud: views.append(record('A').view) or ['ok', 'aborted'][len(views) // 2]
+        )
+        smach.StateMachine.add('B', look, {'ok': 'A', 'aborted': 'done', 'preempted': 'done'})
+    record = OracleContainer.wrap(machine, recover=False)._oracle.record
+    assert machine.execute() == 'done'
+    return views
+
+
+class KeysOfItsOwn(Scripted):
+    """Says by a method of its own which keys it reads."""
+
+    def get_registered_input_keys(self):
+        return Scripted.get_registered_input_keys(self)
+
+
+def test_the_view_of_a_state_s_userdata_is_made_once():
+    first, second = visited(Scripted())
+    assert first is second
+
+
+def test_the_view_of_a_state_with_keys_of_its_own_is_made_at_each_visit():
+    first, second = visited(KeysOfItsOwn())
+    assert first is not second

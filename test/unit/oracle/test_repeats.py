@@ -184,6 +184,7 @@ def test_an_expert_goes_back_and_is_asked_before_the_state_is_repeated():
     assert machine.visits() == ['DETECT', 'POUR', 'PLACE', 'DETECT', 'POUR', 'PLACE']
     held = expert.questions[1]
     assert (held.failed_state, held.failure_kind) == ('POUR', FailureKind.HELD_BACK)
+    assert not held.continuous
     assert sentences(machine)[1] == HELD_BACK + ': asking an expert, 300 s'
     assert deciders(machine)[1] == Decider.HELD_BACK
     assert [event.state for event in machine.of(EventKind.FAILURE)] == ['PLACE']

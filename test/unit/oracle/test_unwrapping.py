@@ -26,6 +26,26 @@ def test_classes_and_states_are_those_of_before():
     assert not hasattr(machine, '_oracle') and not hasattr(inner, '_oracle')
 
 
+class OwnWay(smach.Concurrence):
+    """Executes by itself, so that it asks no hook of the engine's."""
+
+    def execute(self, *args):
+        return smach.Concurrence.execute(self, *args)
+
+
+def test_so_is_that_of_a_container_that_executes_by_itself():
+    branches = OwnWay(outcomes=['done', 'aborted'], default_outcome='done')
+    with branches:
+        smach.Concurrence.add('A', Scripted())
+    machine = smach.StateMachine(outcomes=['done', 'aborted'])
+    with machine:
+        smach.StateMachine.add('ALL', branches)
+    OracleContainer.wrap(machine)
+    assert type(branches) is not OwnWay
+    assert unwrap(machine).execute() == 'done'
+    assert type(branches) is OwnWay
+
+
 def test_it_ends_as_its_author_wrote_it():
     machine, _ = machine_in_machine('aborted', 'aborted')
     OracleContainer.wrap(machine, expert=FakeExpert(supersede('ok'))).execute()

@@ -156,14 +156,13 @@ def _execute(
     autonomy = settings.autonomy if label else RUN
     wait_for_operator(node, (), label or type(state).__name__, autonomy, scope)
     _check_free(recovery, state)
-    with origin.lock:
-        if scope.told is not None:
-            raise NotMet('preempted')
-        origin.running = state
     if not node.tree.begin_precondition(node, state):
-        origin.running = None
         raise NotMet('is being run as a precondition already')
     try:
+        with origin.lock:
+            if scope.told is not None:
+                return None  # who judges it sees the stop
+            origin.running = state
         if label:
             write_constants(behind(gate), constants_of(node.machine, label))
         gate = gate if settings.time_limit_s is None else gate.fork()

@@ -212,7 +212,7 @@ def route_at_preempt(machine: smach.StateMachine, label: str) -> Route:
     registered = states_of(machine)[label].get_registered_outcomes()
     outcome = next((each for each in registered if is_preempted(each)), None)
     route = Route('', False) if outcome is None else route_of(machine, label, outcome)
-    return Route('', False) if route.is_state and route.target == label else route
+    return Route('', False) if route.target == label else route
 
 
 def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
