@@ -315,13 +315,15 @@ def test_it_is_the_authors_where_the_container_has_one_or_where_the_user_says_so
     assert machine.visits() == ['PICK']
 
 
-def test_a_report_is_none_where_the_user_says_so():
+@pytest.mark.parametrize('intended, repaired', [([], ['WORK']), (['succeeded'], [])])
+def test_an_outcome_that_its_author_means_reports_nothing(intended, repaired):
     machine = reporting(
         Scripted('failed', outcomes=BAD),
-        settings={'states': {'REPORT': {'intended_outcomes': ['said']}}},
+        Scripted(outcomes=('succeeded',)),
+        settings={'states': {'REPORT': {'intended_outcomes': intended}}},
     )
-    assert machine.run() == 'failed'
-    assert machine.visits() == ['LOOK', 'WORK', 'REPORT']
+    assert machine.run() == ('done' if repaired else 'failed')
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT', *repaired]
 
 
 def test_where_the_author_is_overridden_a_person_is_asked():

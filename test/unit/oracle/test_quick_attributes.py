@@ -65,15 +65,17 @@ def test_so_has_a_copy():
 
 
 def visited(state):
-    """The view of a state, in a trial of two visits, at its first and at its second visit."""
+    """The views of a state's userdata at its first and at its second visit of a trial."""
     views = []
+
+    def look(outcome):
+        return lambda self, ud: views.append(record('A').view) or outcome
+
     machine = smach.StateMachine(outcomes=['done'])
     with machine:
-        smach.StateMachine.add('A', state, {'ok': 'B', 'aborted': 'B', 'preempted': 'B'})
-        look = Scripted(
-            lambda self, ud: views.append(record('A').view) or ['ok', 'aborted'][len(views) // 2]
-        )
-        smach.StateMachine.add('B', look, {'ok': 'A', 'aborted': 'done', 'preempted': 'done'})
+        smach.StateMachine.add('A', state, dict.fromkeys(['ok', 'aborted', 'preempted'], 'B'))
+        again = Scripted(look('ok'), look('aborted'))
+        smach.StateMachine.add('B', again, {'ok': 'A', 'aborted': 'done', 'preempted': 'done'})
     record = OracleContainer.wrap(machine, recover=False)._oracle.record
     assert machine.execute() == 'done'
     return views
