@@ -37,7 +37,7 @@ _smach_oracle_words() {
       echo 'algorithm1 always_ask any_way escalating ladder learned prose random restart
 retry step_back' ;;
     'expert_console')
-      echo '--bags --help --port --stores --version -h' ;;
+      echo '--bags --help --port --stores --try-calls --version -h' ;;
     'expert_query_server')
       echo '--help --version -h' ;;
     'expert_terminal')

@@ -29,4 +29,9 @@ def make_parser() -> argparse.ArgumentParser:
         help='shows the machines in it whose program has stopped (default: ~stores); may be given '
         'several times',
     )
+    parser.add_argument(
+        '--try-calls',
+        action='store_true',
+        help='send a test message to everybody on the list ~on_call, say who was reached, and end',
+    )
     return parser

@@ -3,6 +3,7 @@
 import secrets
 import socket
 import ssl
+import sys
 import threading
 import time
 from functools import partial
@@ -38,6 +39,7 @@ from .people.people import People
 from .people.shift_journal import ShiftJournal
 from .reach.on_call import read_on_call
 from .reach.reach import Reach
+from .reach.try_calls import try_calls
 from .robots.down_machine_hand import DownMachineHand
 from .robots.down_machines import DownMachines
 from .robots.followed_robots import FollowedRobots
@@ -59,7 +61,7 @@ from .web.audit import Audit
 from .web.connections import LimitedServer
 from .web.handlers import NotFoundHandler, PageFileHandler, SessionHandler
 from .web.sections import PageSections
-from .web.settings import ConsoleSettings, read_settings
+from .web.settings import NONE, ConsoleSettings, read_settings
 
 STATIC = Path(__file__).resolve().parent / 'static'
 PUSH_PERIOD_MS = 100
@@ -318,6 +320,15 @@ def parameter(options: Mapping[str, object], name: str, default: object) -> obje
     return value
 
 
+def _try_calls(settings: ConsoleSettings) -> int:
+    """Print who was reached, and return the exit status: 1 where anybody was not."""
+    if not settings.on_call or settings.public is None:
+        raise SettingsError('~on_call', NONE, 'a file that says who is called (doc/on_call.md)')
+    tried = try_calls(read_on_call(settings.on_call), settings.public.origin)
+    sys.stdout.writelines(each.words + '\n' for each in tried)
+    return int(any(each.why for each in tried))
+
+
 def main() -> None:
     """Entry point of the node `expert_console`."""
     options = vars(make_parser().parse_args(rospy.myargv()[1:]))
@@ -325,7 +336,10 @@ def main() -> None:
     start_master_watch()
     tornado.ioloop.IOLoop.current()
     try:
-        console = Console(read_settings(partial(parameter, options)))
+        settings = read_settings(partial(parameter, options))
+        if options['try_calls']:
+            raise SystemExit(_try_calls(settings))
+        console = Console(settings)
     except SettingsError as err:
         rospy.logfatal('%s', err)
         raise SystemExit(2) from err
