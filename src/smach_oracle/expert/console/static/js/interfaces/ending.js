@@ -21,6 +21,35 @@ export function outcomeRow(choice) {
 }
 
 /**
+ * @typedef {object} Ending a panel of an interface that ends
+ * @property {page.App} app
+ * @property {boolean} busy
+ * @property {Element} problem
+ * @property {() => void} onEnd
+ * @property {() => void} draw
+ */
+
+/**
+ * End an interface; whether the robot has done so.
+ * @template {'hand_over' | 'give_up_interface'} Name
+ * @param {Ending} panel
+ * @param {Name} command
+ * @param {server.Commands[Name]} args
+ */
+export async function settle(panel, command, args) {
+  if (panel.busy) return false;
+  panel.busy = true;
+  setText(panel.problem, '');
+  panel.draw();
+  const reply = await replyTo(panel.app, panel.problem, command, args);
+  panel.busy = false;
+  if (reply?.ok) panel.onEnd();
+  else if (reply) setText(panel.problem, reply.message);
+  panel.draw();
+  return Boolean(reply?.ok);
+}
+
+/**
  * The reply to a command; null where the connection was lost, which `problem` says then.
  * @template {keyof server.Commands} Name
  * @param {page.App} app

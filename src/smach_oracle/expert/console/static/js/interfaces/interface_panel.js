@@ -4,7 +4,7 @@
 import { outputFields, readOutputs } from '../answering/output_field.js';
 import { h, setText } from '../page/dom.js';
 import { keep, render } from '../page/redraw.js';
-import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
+import { outcomeChoice, outcomeRow, settle } from './ending.js';
 import { ManipulationPanel } from './manipulation_panel.js';
 
 /** @type {{ [status in server.InterfaceOutput['status']]: string }} */
@@ -91,27 +91,10 @@ export class InterfacePanel {
     const outputs = readOutputs(this.outputs, this.problem);
     if (!outputs) return;
     const [outcome, why] = [this.outcome.value, this.why.value];
-    this.settle('hand_over', { question: this.question.key, outcome, outputs, why });
+    settle(this, 'hand_over', { question: this.question.key, outcome, outputs, why });
   }
 
   giveUp() {
-    this.settle('give_up_interface', { question: this.question.key, why: this.why.value });
-  }
-
-  /**
-   * @template {'hand_over' | 'give_up_interface'} Name
-   * @param {Name} command
-   * @param {server.Commands[Name]} args
-   */
-  async settle(command, args) {
-    if (this.busy) return;
-    this.busy = true;
-    setText(this.problem, '');
-    this.draw();
-    const reply = await replyTo(this.app, this.problem, command, args);
-    if (reply && reply.ok) this.onEnd();
-    else if (reply) setText(this.problem, reply.message);
-    this.busy = false;
-    this.draw();
+    settle(this, 'give_up_interface', { question: this.question.key, why: this.why.value });
   }
 }

@@ -68,12 +68,12 @@ export class MarkingCanvas {
 
   end() {
     if (this.marking.end()) this.panel.cut();
-    this.panel.refresh();
+    this.panel.draw();
   }
 
   cancel() {
     this.marking.line = null;
-    this.panel.refresh();
+    this.panel.draw();
   }
 
   /** Pixels of the image for one of the screen. */

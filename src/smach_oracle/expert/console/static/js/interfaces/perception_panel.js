@@ -5,7 +5,7 @@ import { h, say, setText } from '../page/dom.js';
 import { keep, render } from '../page/redraw.js';
 import { drawImage } from '../sensors/image_canvas.js';
 import { SensorFeed } from '../sensors/sensor_feed.js';
-import { outcomeChoice, outcomeRow, replyTo } from './ending.js';
+import { outcomeChoice, outcomeRow, replyTo, settle } from './ending.js';
 import { markedFacts } from './marked_facts.js';
 import { MarkingCanvas } from './marking_canvas.js';
 import { ObjectView } from './object_view.js';
@@ -35,8 +35,11 @@ export class PerceptionPanel {
   constructor(app, question, onEnd) {
     this.app = app;
     this.question = question;
-    this.onEnd = onEnd;
     this.over = false;
+    this.onEnd = () => {
+      this.over = true;
+      onEnd();
+    };
     this.busy = false;
     this.cutting = false;
     this.stamp = ''; // of the image
@@ -60,7 +63,7 @@ export class PerceptionPanel {
     this.feed = new SensorFeed(app, () => this.sensors.image, this.root,
       { width: FULL, every: PERIOD_MS, take: (answer, facts) => this.show(answer, facts),
         say: (text, missing) => this.say(text, missing) });
-    this.refresh();
+    this.draw();
   }
 
   build() {
@@ -123,7 +126,7 @@ export class PerceptionPanel {
   /** @param {Tool} tool */
   take(tool) {
     this.canvas.tool = tool;
-    this.refresh();
+    this.draw();
   }
 
   /**
@@ -148,7 +151,7 @@ export class PerceptionPanel {
     }
     this.stamp = stamp;
     this.root.classList.add('shown');
-    this.refresh();
+    this.draw();
   }
 
   /** What was cut out is about something else. */
@@ -175,7 +178,7 @@ export class PerceptionPanel {
       if (reply && done === this.generation) this.takeIn(reply);
     }
     this.cutting = false;
-    this.refresh();
+    this.draw();
   }
 
   /** @param {server.Reply<'mark'>} reply */
@@ -186,19 +189,19 @@ export class PerceptionPanel {
     this.root.dataset['shownAfter'] = String(Math.round(performance.now() - this.askedMs));
     setText(this.problem, ok ? '' : message);
     this.warning = ok ? message : '';
-    this.refresh();
+    this.draw();
   }
 
   undo() {
     if (this.marking.undo()) this.cut();
     else this.forget();
-    this.refresh();
+    this.draw();
   }
 
   clear() {
     this.marking.clear();
     this.forget();
-    this.refresh();
+    this.draw();
   }
 
   /** @param {'at_goal' | 'fresh'} frame */
@@ -208,35 +211,15 @@ export class PerceptionPanel {
     const reply = await this.ask('use_frame', { question: this.question.key, frame });
     this.busy = false;
     if (reply && !reply.ok) setText(this.problem, reply.message);
-    this.refresh();
+    this.draw();
   }
 
   accept() {
-    return this.settle('hand_over',
+    settle(this, 'hand_over',
       { question: this.question.key, outcome: this.outcome.value, why: '' });
   }
 
-  giveUp() { return this.settle('give_up_interface', { question: this.question.key, why: '' }); }
-
-  /**
-   * @template {'hand_over' | 'give_up_interface'} Name
-   * @param {Name} command
-   * @param {server.Commands[Name]} args
-   */
-  async settle(command, args) {
-    if (this.busy) return;
-    this.busy = true;
-    this.refresh();
-    const reply = await this.ask(command, args);
-    this.busy = false;
-    if (reply && reply.ok) {
-      this.over = true;
-      this.onEnd();
-    } else if (reply) {
-      setText(this.problem, reply.message);
-    }
-    this.refresh();
-  }
+  giveUp() { settle(this, 'give_up_interface', { question: this.question.key, why: '' }); }
 
   /**
    * null where the connection was lost.
@@ -246,7 +229,7 @@ export class PerceptionPanel {
    */
   ask(command, args) { return replyTo(this.app, this.problem, command, args); }
 
-  refresh() {
+  draw() {
     this.canvas.paint();
     render(this.head, this.headView());
     render(this.side, this.sideView());

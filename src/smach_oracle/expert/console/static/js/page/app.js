@@ -16,13 +16,6 @@ import { Store } from './store.js';
 
 /** @typedef {import('./connection.js').State} State */
 /** @typedef {'auto' | 'light' | 'dark'} Theme */
-/**
- * @typedef {object} Tab
- * @property {string} id
- * @property {page.PanelView} view
- * @property {HTMLButtonElement} button
- * @property {HTMLElement} badge
- */
 
 /** @type {{ [state in State]: string }} */
 const STATES = { connecting: 'connecting…', connected: 'live', 'signed-out': 'signed out',
@@ -93,10 +86,7 @@ export class App {
       this.themeButton, this.person);
   }
 
-  /**
-   * @param {page.Panel} panel
-   * @returns {Tab}
-   */
+  /** @param {page.Panel} panel */
   tab({ id, title, create }) {
     const badge = h('span', { class: 'badge', hidden: true });
     const button = h('button', { class: 'tab', id: 'tab-' + id, onclick: () => {

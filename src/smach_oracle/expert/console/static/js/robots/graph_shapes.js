@@ -12,13 +12,7 @@ import { svg } from '../page/dom.js';
  * @property {string} outcome '' of the edges of ORACLE
  * @property {boolean} ofOracle
  */
-/**
- * @typedef {object} StateShape
- * @property {SVGGElement} group
- * @property {SVGTextElement} rate
- * @property {SVGTitleElement} title
- * @property {[x: number, y: number]} at
- */
+/** @typedef {ReturnType<typeof stateShape>} StateShape */
 
 const RAIL_GAP = 96; // px, from the states to the rail
 const RAIL_WIDTH = 64;
@@ -165,7 +159,6 @@ function openByKey(event, open) {
  * @param {server.Place} place
  * @param {string} id
  * @param {(() => void) | null} open where it is a container itself
- * @returns {StateShape}
  */
 export function stateShape(label, [x, y, width, height], id, open) {
   const rate = svg('text', { y: 15, class: 'state-rate' });
@@ -179,5 +172,5 @@ export function stateShape(label, [x, y, width, height], id, open) {
   svg('text', { y: -3, class: 'state-name' }, shorten(label, width)), rate,
   svg('g', { class: 'failed-mark', transform: translate(width / 2 - 2, -height / 2 + 2) },
     svg('circle', { r: 9 }), svg('text', { y: 4 }, '!')));
-  return { group, rate, title, at: [x, y] };
+  return { group, rate, title, at: /** @type {[x: number, y: number]} */ ([x, y]) };
 }

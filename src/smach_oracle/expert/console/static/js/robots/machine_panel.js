@@ -8,14 +8,7 @@ import { DownList } from './down_list.js';
 import { MachineHand } from './machine_hand.js';
 import { MachineView, machinesNow } from './machine_view.js';
 
-/**
- * @typedef {object} PickerRow
- * @property {string} path
- * @property {boolean} failed
- * @property {boolean} active
- * @property {boolean} current
- */
-/** @typedef {{ robot: string, alive: boolean | undefined, rows: PickerRow[] }} PickerGroup */
+/** @typedef {ReturnType<MachinePanel['pickerGroup']>} PickerGroup */
 
 /** @type {page.Panel} */
 export const machines = { id: 'machines', title: 'Machines',
@@ -131,10 +124,7 @@ class MachinePanel {
       rows.map((row) => this.pickerButton(robot, row)));
   }
 
-  /**
-   * @param {string} robot
-   * @returns {PickerGroup}
-   */
+  /** @param {string} robot */
   pickerGroup(robot) {
     const { alive: known, active, failed, paths } = this.source.state(robot);
     const alive = known && !this.app.liveness.isSilent(robot);
@@ -149,7 +139,7 @@ class MachinePanel {
 
   /**
    * @param {string} robot
-   * @param {PickerRow} row
+   * @param {PickerGroup['rows'][0]} row
    */
   pickerButton(robot, { path, failed, active, current }) {
     const names = path.split('/');
