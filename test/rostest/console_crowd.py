@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A crowd without a token stops nobody who has one: 1,100 idle connections at the usual limit on
-files, and wrong tokens from many addresses. A person signs in, claims and answers among them.
+files, requests that come byte by byte, and wrong tokens from many addresses. A person signs in,
+claims and answers among them.
 """
 
 import http.client
@@ -9,6 +10,7 @@ import os
 import resource
 import socket
 import sys
+import time
 import unittest
 
 import rospy
@@ -23,6 +25,8 @@ from smach_oracle.msg import OracleEvent
 
 USUAL_FILES = 1024
 CROWD = 1100
+DRIPPING = 120
+DRIPS_S = 30.0  # the console gives a body 10 s
 ADDRESSES = ['127.0.0.{}'.format(number) for number in range(1, 41)]
 GO_TO_PLACE = '.choice.goto[data-name=PLACE]'
 
@@ -80,7 +84,43 @@ class Crowd(ConsolePage, unittest.TestCase):
             codes.add(answer.status)
         return codes
 
-    def test_who_has_a_token_comes_in_and_answers(self):
+    def drip(self):
+        """Requests that come byte by byte. Calling adds one each, and tells how many are left."""
+        lines = []
+        begun = b'POST /session HTTP/1.1\r\nHost: localhost\r\nContent-Length: 999\r\n\r\n{'
+        for number in range(DRIPPING):
+            address = (ADDRESSES[number % len(ADDRESSES)], 0)
+            lines.append(socket.create_connection(('127.0.0.1', self.port), 20.0, address))
+            self.addCleanup(lines[-1].close)
+            lines[-1].sendall(begun)
+
+        def left():
+            for line in list(lines):
+                try:
+                    line.sendall(b'.')
+                except OSError:
+                    lines.remove(line)
+            return len(lines)
+
+        return left
+
+    def test_1_requests_that_come_byte_by_byte_are_ended_and_hold_nobody_up(self):
+        left = self.drip()
+        self.assertGreater(left(), 0)
+        slowest_s = 0.0
+        begun_s = time.monotonic()
+        while left() and time.monotonic() - begun_s < DRIPS_S:
+            asked_s = time.monotonic()
+            line = http.client.HTTPConnection('127.0.0.1', self.port, 20.0, ('127.0.1.1', 0))
+            line.request('GET', '/')
+            self.assertEqual(line.getresponse().status, 200)
+            line.close()
+            slowest_s = max(slowest_s, time.monotonic() - asked_s)
+            rospy.rostime.wallsleep(0.2)  # how slowly they drip
+        self.assertEqual(left(), 0)
+        self.assertLess(slowest_s, 2.0)
+
+    def test_2_who_has_a_token_comes_in_and_answers(self):
         browser = self.browser
         self.crowd()
         codes = set.union(*(self.guess(address) for address in ADDRESSES))
