@@ -71,7 +71,7 @@ def remappings_of(container: HasStates) -> Dict[str, Mapping[str, str]]:
     return container._remappings
 
 
-def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, Any]:
+def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, object]:
     """Return what is written into the userdata before each visit of a state."""
     return machine._constants.get(label) or {}
 
@@ -112,13 +112,13 @@ class KeptParts:
         return None
 
 
-def data_of(userdata: smach.UserData) -> Dict[str, Any]:
+def data_of(userdata: smach.UserData) -> Dict[str, object]:
     """Return the values of userdata by key, to read and to write."""
-    data: Dict[str, Any] = userdata._data
+    data: Dict[str, object] = userdata._data
     return data
 
 
-def hold_data(userdata: smach.UserData, data: MutableMapping[str, Any]) -> None:
+def hold_data(userdata: smach.UserData, data: MutableMapping[str, object]) -> None:
     """Have userdata keep its values in another mapping."""
     held: Any = userdata
     held._data = data

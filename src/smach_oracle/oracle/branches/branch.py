@@ -2,7 +2,7 @@
 
 import threading
 import traceback
-from typing import Any, Dict, Mapping, Optional, Protocol, Sequence, Tuple, cast
+from typing import Dict, Mapping, Optional, Protocol, Sequence, Tuple, cast
 
 import smach
 
@@ -19,7 +19,7 @@ End = Tuple[object, Optional[Exception]]  # of a state: its outcome, and what it
 class ItemPort(Protocol):
     """The Iterator around a branch."""
 
-    at_item: Optional[Dict[str, Any]]  # the userdata as the item under way began
+    at_item: Optional[Dict[str, object]]  # the userdata as the item under way began
 
     def begin_item(self) -> None:
         """Note that an item begins."""
@@ -37,7 +37,7 @@ class Branch(smach.Container):
     """
 
     _oracle: TreeNode
-    _constants: Dict[str, Mapping[str, Any]] = {}  # none, never written
+    _constants: Dict[str, Mapping[str, object]] = {}  # none, never written
     _pause_requested = False
     _is_preempt_passed_on = False
 

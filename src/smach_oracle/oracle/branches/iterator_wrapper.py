@@ -1,6 +1,6 @@
 """Iterators of a wrapped tree: which item is under way, and where one goes on."""
 
-from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
+from typing import Callable, Dict, Iterator, Mapping, Optional, Tuple
 
 import smach
 
@@ -25,8 +25,8 @@ class IteratorWrapper(ContainerWrapper):
         self._trial_id = ''  # that of `tracked`
         self._rounds = 0  # how often it has begun again
         self._inside: Tuple[Tuple[int, int], ...] = ()  # marks of the Iterators around it then
-        self._given: Dict[str, Any] = {}  # its io keys when it began
-        self.at_item: Optional[Dict[str, Any]] = None  # its userdata as the item under way began
+        self._given: Dict[str, object] = {}  # its io keys when it began
+        self.at_item: Optional[Dict[str, object]] = None  # its userdata as the item under way began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self.is_left = False
         self._is_asked_to_go_on = False
@@ -47,7 +47,7 @@ class IteratorWrapper(ContainerWrapper):
             or isinstance(judge(node, node.record(label), outcome, None), Failure)
         )
 
-    def items(self, container: smach.Container, items: Any) -> Any:
+    def items(self, container: smach.Container, items: object) -> object:
         """Return what the Iterator goes through in place of its items."""
         is_own = container is self.container and self._is_in_use
         return self.tracked if is_own and self.tracked is not None else items
@@ -106,7 +106,7 @@ class IteratorWrapper(ContainerWrapper):
 
     def begin_item(self) -> None:
         """Note that an item begins."""
-        data: Mapping[str, Any] = data_of(self.container.userdata)
+        data: Mapping[str, object] = data_of(self.container.userdata)
         for branch in self.branches.values():
             node: TreeNode = mark_on(branch)
             record = node.records.by_label.get(node.site.label)
@@ -115,7 +115,7 @@ class IteratorWrapper(ContainerWrapper):
                 data = unfinished.snapshot  # before the program was stopped: it has written since
         self.at_item = self._snapshot(data)
 
-    def _snapshot(self, data: Mapping[str, Any]) -> Dict[str, Any]:
+    def _snapshot(self, data: Mapping[str, object]) -> Dict[str, object]:
         parent = self.parent
         return take_snapshot(data, parent.in_force.deep_copy_keys, parent.warn_not_copied)
 
@@ -130,7 +130,7 @@ class IteratorWrapper(ContainerWrapper):
                     node.execution.forget_unrecovered()
         super()._leave(outcome, error)
 
-    def __getstate__(self) -> Dict[str, Any]:
+    def __getstate__(self) -> Dict[str, object]:
         return dict(
             super().__getstate__(),
             tracked=None,
@@ -154,7 +154,7 @@ class IteratorWrapper(ContainerWrapper):
         for key, value in kept.items():
             container.userdata[key] = value
 
-    def _keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, Any]:
+    def _keys_to_keep(self, userdata: Optional[smach.UserData]) -> Dict[str, object]:
         """Return the values of its keys that its inputs do not replace, as it begins or goes on.
 
         What finished items have left under keys that are inputs and outputs stays where the

@@ -149,7 +149,7 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
     return judged_at(parent, label, outcome)[1] is not FailureKind.NOT_A_FAILURE
 
 
-def _entries(given: object) -> Tuple[Tuple[Any, Any], ...]:
+def _entries(given: object) -> Tuple[Tuple[Any, object], ...]:
     """Return the entries of an outcome map, or of the conditions in it. None of what is no map."""
     items = attribute_of(given, 'items')
     return tuple(items()) if callable(items) else ()

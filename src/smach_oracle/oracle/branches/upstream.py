@@ -102,7 +102,7 @@ class _Asking:
 
     _oracle_wrapper: Any
 
-    def execute(self, *args: Any, **kwargs: Any) -> Optional[str]:
+    def execute(self, *args: object, **kwargs: Any) -> Optional[str]:
         base: Any = super()
         hook = self._oracle_wrapper
 
@@ -128,7 +128,7 @@ class _Asking:
         state: smach.State = _users_state(base.__getitem__(label))
         return state
 
-    def __reduce_ex__(self, protocol: Any) -> Tuple[Any, ...]:
+    def __reduce_ex__(self, protocol: Any) -> Tuple[object, ...]:
         """Make the class again on unpickling: a class made here cannot be found by name."""
         base: Any = super()
         reduced = base.__reduce_ex__(max(2, protocol))
@@ -178,7 +178,7 @@ def _give_back(container: Any, own: Tables) -> None:
     )
 
 
-def _at_rest(attributes: Dict[str, Any]) -> Dict[str, Any]:
+def _at_rest(attributes: Dict[str, Any]) -> Dict[str, object]:
     """Return the attributes of a container for a copy, as they are while it is at rest."""
     if '_states' in attributes:
         attributes['_states'] = {

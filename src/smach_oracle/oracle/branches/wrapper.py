@@ -2,7 +2,7 @@
 
 import contextlib
 import threading
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
+from typing import Callable, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
 
 import smach
 
@@ -21,11 +21,11 @@ from .branch import Branch
 class StoredPort(Protocol):
     """The part of a stored container that a Concurrence or an Iterator goes on from."""
 
-    keys: Dict[str, Any]  # of its userdata
+    keys: Dict[str, object]  # of its userdata
     gone: List[str]  # keys that are not to be there
     item: int  # number of the one to begin with, from 1. 0 means the first
 
-    def complete_snapshots(self, data: Mapping[str, Any]) -> None:
+    def complete_snapshots(self, data: Mapping[str, object]) -> None:
         """Have the values that were not stored in the snapshots, too."""
 
 
@@ -199,12 +199,12 @@ class ContainerWrapper:
         children: Mapping[str, Optional[smach.State]] = self.container.get_children()
         yield from ((label, state) for label, state in list(children.items()) if state is not None)
 
-    def __getstate__(self) -> Dict[str, Any]:
+    def __getstate__(self) -> Dict[str, object]:
         state = dict(self.__dict__, _is_in_use=False, runners={})
         del state['_lock']
         return state
 
-    def __setstate__(self, state: Dict[str, Any]) -> None:
+    def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
         self._lock = threading.Lock()
 

@@ -12,7 +12,7 @@ from typing import Any, Callable, Deque, Dict, List, Mapping, Tuple, Union
 from ..errors import SettingsError
 from ..number_checks import is_number, is_whole
 
-Snapshot = Dict[str, Any]  # what an estimator has learned, as plain data
+Snapshot = Dict[str, object]  # what an estimator has learned, as plain data
 Learned = Mapping[str, Any]  # a snapshot that somebody else has made
 _ROUNDING = 1e-9  # a rate that equals a threshold except for binary rounding has reached it
 

@@ -10,7 +10,7 @@ import socket
 import sys
 from enum import Enum
 from importlib import import_module
-from typing import Any, Dict, Mapping
+from typing import Dict, Mapping
 
 import smach
 from smach_oracle.release import VERSION
@@ -107,7 +107,7 @@ def _digest(data: bytes) -> str:
     return hashlib.blake2b(data, digest_size=DIGITS // 2).hexdigest()
 
 
-def _plain(value: object) -> Any:
+def _plain(value: object) -> object:
     """Return plain data that is equal where settings are. An object stands there by its name."""
     if dataclasses.is_dataclass(value):
         return {each.name: _plain(getattr(value, each.name)) for each in dataclasses.fields(value)}

@@ -156,13 +156,13 @@ class TrackedItems:
     def __len__(self) -> int:
         return len(cast(Sized, self.given))
 
-    def __getitem__(self, index: Any) -> Any:
+    def __getitem__(self, index: object) -> object:
         return cast(Any, self.given)[index]
 
     def __bool__(self) -> bool:
         return bool(self.given)
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name: str) -> object:
         if name.startswith('_') or name == 'given':
             raise AttributeError(name)
         return getattr(self.given, name)
@@ -174,7 +174,7 @@ class TrackedItems:
         return str(self.given)
 
 
-def can_be_indexed(iterator: Any) -> bool:
+def can_be_indexed(iterator: object) -> bool:
     """Whether what an Iterator goes through has the same items in the same order each time."""
     items = items_of(iterator)
     items = items.given if isinstance(items, TrackedItems) else items

@@ -179,7 +179,7 @@ class StateRecord:
         with self._lock:
             return self._up_to_date().snapshot()
 
-    def way_results(self) -> Dict[str, Any]:
+    def way_results(self) -> Dict[str, object]:
         """Return the results of its ways as plain data, the same object until there is one more.
 
         It is empty where there is none. See `WayLog.told`.

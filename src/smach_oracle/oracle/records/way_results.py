@@ -59,7 +59,7 @@ class WayLog:
         self.of_kinds: Dict[Tuple[str, int], Count] = {}
         self._failures: Dict[str, int] = {}  # results by kind of failure, of those with a text
         self.gone: Optional[WayResult] = None
-        self._told: Optional[Dict[str, Any]] = None  # until there is one more
+        self._told: Optional[Dict[str, object]] = None  # until there is one more
         self._minutes: Callable[[], float] = float
 
     def failure_key(self, kind: int, outcome: str, text: str) -> str:
@@ -118,7 +118,7 @@ class WayLog:
         self.total = total
         self._told = None
 
-    def told(self) -> Dict[str, Any]:
+    def told(self) -> Dict[str, object]:
         """Return the results as plain data, nothing where there is none. See `results_in`."""
         if not self.results:
             return {}
@@ -126,7 +126,7 @@ class WayLog:
             self._told = told_of(self.results, self.total)
         return self._told
 
-    def take_over(self, learned: Mapping[str, Any]) -> None:
+    def take_over(self, learned: Mapping[str, object]) -> None:
         """Go on with the results that are among what was learned of a state.
 
         :raises ValueError: where they cannot be read.
@@ -193,8 +193,8 @@ def _index(text: str) -> int:
 
 
 def merged_ways(
-    own: Mapping[str, Any], base: Mapping[str, Any], theirs: Mapping[str, Any]
-) -> Dict[str, Any]:
+    own: Mapping[str, object], base: Mapping[str, Any], theirs: Mapping[str, object]
+) -> Dict[str, object]:
     """Return the results of others, and behind them what is new of our own since `base`.
 
     Where others have none, a program of an earlier version may have dropped them: ours stay.

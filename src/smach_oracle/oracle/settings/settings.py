@@ -6,7 +6,7 @@ a SettingsError that names the dotted key, the value and what is allowed.
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, Collection, Dict, Mapping, Optional, Sequence, Tuple, Union
+from typing import Collection, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from ..decision.failure_rate import ESTIMATORS
 from ..decision.policies import POLICIES
@@ -344,7 +344,7 @@ class Settings:
         names of `states` stand for it, the most exact one wins.
         """
         full = '{}/{}'.format(path, label) if path else label
-        merged: Dict[str, Any] = {}
+        merged: Dict[str, object] = {}
         for name in sorted((name for name in self.states if matches(name, full)), key=exactness):
             merged.update(self.states[name])
         return replace(self.defaults, **merged) if merged else self.defaults
@@ -415,7 +415,7 @@ def _hint(prefix: str, key: str) -> str:
 
 def _checked_state(
     prefix: str, given: Mapping[str, object], defaults: StateSettings, resolver: Optional[Resolver]
-) -> Dict[str, Any]:
+) -> Dict[str, object]:
     found = checked(StateSettings, prefix, given, resolver)
     settings = replace(defaults, **found)
     if settings.moderate_from > settings.high_from:
