@@ -5,17 +5,17 @@ A script knows nothing of the oracle. Where it says `# built: MACHINE`, the copy
 """
 
 import json
-import os
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any, Dict, List, NamedTuple, Tuple
 
 from oracle_support import RUNNER
+from warm_python import ORACLE_RUN as IMPORTED_FIRST
+from warm_python import WarmPython
 
 PROGRAMS = Path(__file__).resolve().parent / 'programs'
 BARE, LIBRARY, ORACLE_RUN = 'bare', 'library', 'oracle_run'
@@ -58,6 +58,8 @@ class Programs:
     def __init__(self) -> None:
         self._folder = Path(tempfile.mkdtemp())
         self._pool = ThreadPoolExecutor(AT_ONCE)
+        # the scripts import SMACH and the oracle where they stand
+        self._python, self._oracle_run = WarmPython(), WarmPython(*IMPORTED_FIRST)
         self._runs: Dict[Tuple[str, ...], 'Future[Ending]'] = {}
         for name, settings in (('recovering', RECOVERING), ('helpless', HELPLESS)):
             _copy_wrapped(self._folder / name, settings)
@@ -70,7 +72,9 @@ class Programs:
         key = (way, program, how, settings if way != BARE else '')
         if key not in self._runs:
             node = re.sub(r'\W', '_', '_'.join(key))
-            self._runs[key] = self._pool.submit(_run, self._command(*key) + [how], program, node)
+            command = self._command(*key) + [how]
+            python = self._oracle_run if way == ORACLE_RUN else self._python
+            self._runs[key] = self._pool.submit(_run, python, command, program, node)
         return self._runs[key]
 
     def ending(self, *key: str) -> Ending:
@@ -79,16 +83,18 @@ class Programs:
 
     def close(self) -> None:
         self._pool.shutdown()
+        self._python.close()
+        self._oracle_run.close()
         shutil.rmtree(str(self._folder))
 
     def _command(self, way: str, program: str, how: str, settings: str) -> List[str]:
         path = str(PROGRAMS / (program + '.py'))
         if way == ORACLE_RUN:
             config = str(self._folder / (settings + '.yaml'))
-            return [sys.executable, '-c', RUNNER, '--config', config, path]
+            return ['-c', RUNNER, '--config', config, path]
         if way == LIBRARY:
             path = str(self._folder / settings / (program + '.py'))
-        return [sys.executable, path]
+        return [path]
 
 
 def _copy_wrapped(folder: Path, settings: Dict[str, Any]) -> None:
@@ -102,23 +108,13 @@ def _copy_wrapped(folder: Path, settings: Dict[str, Any]) -> None:
         (folder / path.name).write_text(_MARKER.sub(wrapping, path.read_text()))
 
 
-def _run(command: List[str], program: str, node: str) -> Ending:
+def _run(python: WarmPython, command: List[str], program: str, node: str) -> Ending:
     command = command + ARGUMENTS.get(program, []) + ['__name:=' + node]
-    process = subprocess.Popen(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        universal_newlines=True,
-        env=dict(os.environ, PYTHONDONTWRITEBYTECODE='1'),
-    )
-    code = None
     try:
-        output, errors = process.communicate(timeout=HUNG_AFTER_S)
-        code = process.returncode
-    except subprocess.TimeoutExpired:
-        process.kill()
-        output, errors = process.communicate()
+        ended = python.run(command, HUNG_AFTER_S)
+        code, output, errors = ended.returncode, ended.stdout, ended.stderr
+    except subprocess.TimeoutExpired as hung:
+        code, output, errors = None, str(hung.stdout), str(hung.stderr)
     said = [line for line in output.splitlines() if _SAID.match(line)]
     shown = _ERROR.findall(_IN_THREAD.sub('', errors)) if code else []
     return Ending(code, said, shown[-1] if shown else '', errors)

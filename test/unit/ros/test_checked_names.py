@@ -3,8 +3,6 @@ state would run that its author forbids or limits.
 """
 
 import os
-import subprocess
-import sys
 import textwrap
 
 import pytest
@@ -14,21 +12,18 @@ CHAIN = "machine('HOME', 'GRASP').execute()"
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, warm_python):
     """Run a script under oracle_run, or check it; returns exit code, output and errors."""
 
     def run_script(settings, text=CHAIN, *options):
         (tmp_path / 'task.py').write_text('import smach\n' + MACHINES + textwrap.dedent(text))
         (tmp_path / 'oracle.yaml').write_text(settings)
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
-        done = subprocess.run(
-            [sys.executable, '-c', RUNNER, '--config', 'oracle.yaml', *options, 'task.py'],
+        done = warm_python.run(
+            ['-c', RUNNER, '--config', 'oracle.yaml', *options, 'task.py'],
             cwd=str(tmp_path),
             env=environment,
             timeout=120,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            universal_newlines=True,
         )
         return done.returncode, done.stdout, done.stderr
 

@@ -63,23 +63,17 @@ def spy():
 
 
 @pytest.fixture
-def check(tmp_path):
+def check(tmp_path, warm_python):
     """Check a script with settings; returns exit code, report and stderr."""
 
     def run(text, settings='', master=NOBODY, options=()):
         (tmp_path / 'task.py').write_text(PRELUDE + textwrap.dedent(text))
         (tmp_path / 'oracle.yaml').write_text(settings)
-        done = subprocess.run(
-            [sys.executable, '-c', RUNNER, '--check', '--config', 'oracle.yaml']
-            + list(options)
-            + ['task.py'],
+        done = warm_python.run(
+            ['-c', RUNNER, '--check', '--config', 'oracle.yaml', *options, 'task.py'],
             cwd=str(tmp_path),
             timeout=120,
-            stdin=subprocess.DEVNULL,
             env=dict(os.environ, ROS_MASTER_URI=master, ROS_HOSTNAME='localhost'),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            universal_newlines=True,
         )
         assert 'STATE RUNS' not in done.stdout + done.stderr
         assert all(len(line) <= 100 for line in done.stdout.splitlines())

@@ -31,16 +31,18 @@ def machine(*outcomes, cls=smach.StateMachine):
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, warm_python):
     """Run a script under oracle_run, or directly; returns the finished process."""
 
     def run_script(text, *args, options=(), directly=False, name='task.py'):
         path = tmp_path / name
         path.write_text(PRELUDE + textwrap.dedent(text))
-        command = [sys.executable] if directly else [sys.executable, '-c', RUNNER] + list(options)
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
+        if not directly:
+            command = ['-c', RUNNER, *options, name, *args]
+            return warm_python.run(command, cwd=str(tmp_path), env=environment, timeout=60)
         return subprocess.run(
-            command + [name] + list(args),
+            [sys.executable, name, *args],
             cwd=str(tmp_path),
             env=environment,
             timeout=60,

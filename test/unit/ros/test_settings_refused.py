@@ -1,8 +1,6 @@
 """A mistake in the settings ends oracle_run with exit code 2 before any state runs."""
 
 import os
-import subprocess
-import sys
 import textwrap
 
 import pytest
@@ -22,7 +20,7 @@ def ready(userdata):
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, warm_python):
     """Run a script under oracle_run with settings; returns exit code, output and errors."""
 
     def run_script(settings, text='machine("HOME", "PICK").execute()'):
@@ -30,14 +28,11 @@ def run(tmp_path):
         (tmp_path / 'oracle.yaml').write_text(settings)
         (tmp_path / 'checks.py').write_text('def clear(userdata):\n    return True\n')
         environment = dict(os.environ, ROS_MASTER_URI='http://localhost:1')  # nobody is there
-        done = subprocess.run(
-            [sys.executable, '-c', RUNNER, '--config', 'oracle.yaml', 'task.py'],
+        done = warm_python.run(
+            ['-c', RUNNER, '--config', 'oracle.yaml', 'task.py'],
             cwd=str(tmp_path),
             env=environment,
             timeout=60,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            universal_newlines=True,
         )
         return done.returncode, done.stdout, done.stderr
 
