@@ -43,7 +43,9 @@ class TrialPanel {
     this.replay = new TrialReplay(app, (event) => this.log.mark(event.seq));
     this.recorded = new RecordedTrials(app, () => this.showRecorded());
     this.log = new EventLog((seq) => this.replay.pick(seq));
-    this.replay.root.append(h('div', { class: 'replay-below' }, this.replay.stage, this.log.root));
+    // what comes and goes with a failure is last: nothing slips away from under a finger
+    this.replay.root.append(h('div', { class: 'replay-below' }, this.replay.stage, this.log.root),
+      this.replay.lastSeconds.root);
     this.root = h('div', {});
     app.store.onEvents((slice) => this.take(slice));
   }

@@ -47,8 +47,7 @@ export class TrialReplay {
     this.lastSeconds = new FailureSeconds(app);
     this.stage = h('div', {});
     this.root = h('div', { class: 'replay', onkeydown: (event) => this.keyOutside(event) },
-      this.controls, this.timeline.root, this.words, this.question.root,
-      this.lastSeconds.root, this.stage);
+      this.controls, this.timeline.root, this.words, this.question.root, this.stage);
   }
 
   /** Index of the last event. */
