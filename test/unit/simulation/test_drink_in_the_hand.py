@@ -6,7 +6,7 @@ import pytest
 from smach_oracle.msg import PickGoal
 from smach_oracle.pr2.nodes.kitchen_skills import FRIDGE
 from smach_oracle.pr2.planning.arm import TILT, Arm
-from smach_oracle.pr2.skills.fridge_pick import beside
+from smach_oracle.pr2.skills.fridge_pick import CARRIED, beside
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import no_report
 from smach_oracle.simulation.rehearsal.drink_retrieval import DrinkRetrievalRehearsal
@@ -35,15 +35,35 @@ def tilt(world, name):
 
 
 def test_a_drink_that_creeps_between_the_fingers_is_not_lost_on_the_way_out():
+    """It creeps a few millimetres.
+
+    It stays in the hand from a friction of 0.074 on, and from 0.076 on without the firmer grip of
+    what is carried. Other systems differ in the last digits of the contacts. So it is 0.09, and the
+    grip is looked at.
+    """
     dry = draw(20, benign=True)
     wet = [
-        body._replace(friction=0.077, mass=0.70) if body.name == 'drink_0' else body
+        body._replace(friction=0.09, mass=0.70) if body.name == 'drink_0' else body
         for body in dry.bodies
     ]
     world, trial = before_the_shelf(dry._replace(bodies=tuple(wet)))
+    robot, grips, driven_with = trial.robot, [], []
+    gripper, drive = robot.gripper, robot.drive
+
+    def noted(arm, position, effort):
+        grips.append(effort)
+        return gripper(arm, position, effort)
+
+    def driven(goal):
+        if world.holding('drink_0'):
+            driven_with.append(grips[-1])
+        drive(goal)
+
+    robot.gripper, robot.drive = noted, driven
     for _, work in trial.states[5:7]:
         work()
     assert world.holding('drink_0')
+    assert driven_with and min(driven_with) >= CARRIED
     world.close()
 
 

@@ -7,6 +7,7 @@ import itertools
 
 import numpy as np
 import pytest
+from forked import in_a_fork
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
 from support.stopped_robot import stopped_after
@@ -213,52 +214,77 @@ def next_of(machine, label):
     )
 
 
-@pytest.mark.parametrize('motions', [4, 11, 99])
-def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(motions):
-    """99: it had ended, and nobody was told."""
+def begun(end):
+    """A world and a trial in it that has come to a state, given by its place in the list."""
     world = World(draw(1, benign=True))
     trial = drink_rehearsal.DrinkRetrievalRehearsal(world)
-    for _, work in trial.states[:-1]:
+    for _, work in trial.states[:end]:
         work()
-    hand_over = trial.states[-1][1]
-    stopped_after(trial.robot, motions)
-    if motions < 99:
-        with pytest.raises(SkillError, match='told to stop'):
-            hand_over()
-    else:
-        hand_over()
-    hand_over()
-    world.step(60)
-    assert judge(world, world.scene.goal).success
-    if motions == 99:  # it has been taken from the palm
-        world.reset(world.scene)
-        with pytest.raises(SkillError):
-            hand_over()
+    return world, trial
+
+
+@pytest.fixture(scope='module')
+def before_the_hand_over():
+    world, trial = begun(-1)
+    yield world, trial
     world.close()
+
+
+@pytest.fixture(scope='module')
+def before_the_pick():
+    world, trial = begun(5)
+    yield world, trial
+    world.close()
+
+
+@pytest.mark.parametrize('motions', [4, 11, 99])
+def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(
+    before_the_hand_over, motions
+):
+    """99: it had ended, and nobody was told."""
+    world, trial = before_the_hand_over
+    hand_over = trial.states[-1][1]
+
+    def stopped_and_ended():
+        stopped_after(trial.robot, motions)
+        if motions < 99:
+            with pytest.raises(SkillError, match='told to stop'):
+                hand_over()
+        else:
+            hand_over()
+        hand_over()
+        world.step(60)
+        assert judge(world, world.scene.goal).success
+        if motions == 99:  # it has been taken from the palm
+            world.reset(world.scene)
+            with pytest.raises(SkillError):
+                hand_over()
+
+    in_a_fork(stopped_and_ended)
 
 
 @pytest.mark.parametrize('motions', [3, 5, 7, 99])
-def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(motions):
+def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(before_the_pick, motions):
     """99: it had ended, and nobody was told."""
-    world = World(draw(1, benign=True))
-    trial = drink_rehearsal.DrinkRetrievalRehearsal(world)
-    for _, work in trial.states[:5]:
-        work()
+    world, trial = before_the_pick
     pick, do = trial.states[5][1], trial.robot._do
-    stopped_after(trial.robot, motions, for_good=True)
-    if motions < 99:
-        with pytest.raises((RobotError, SkillError), match='told to stop'):
+
+    def stopped_and_ended():
+        stopped_after(trial.robot, motions, for_good=True)
+        if motions < 99:
+            with pytest.raises((RobotError, SkillError), match='told to stop'):
+                pick()
+        else:
             pick()
-    else:
+        trial.robot._do = do
+        assert bool(world.holding('drink_0')) == (motions > 3)
         pick()
-    trial.robot._do = do
-    assert bool(world.holding('drink_0')) == (motions > 3)
-    pick()
-    for _, work in trial.states[6:]:
-        work()
-    world.step(60)
-    assert judge(world, world.scene.goal).success
-    world.close()
+        for _, work in trial.states[6:]:
+            work()
+        world.step(60)
+        assert judge(world, world.scene.goal).success
+
+    in_a_fork(stopped_and_ended)
 
 
 def test_the_closed_door_is_opened_by_contact_alone_and_the_base_stands_clear_of_it():
