@@ -41,8 +41,9 @@ def installed(tmp_path_factory):
     copy_sources(top / 'smach_oracle')
     (top / 'out').mkdir()
     run(
-        'cmake ../smach_oracle {} -DCMAKE_INSTALL_PREFIX="$PWD/../installed"; make -j2; make '
-        'install'.format(PYTHON),
+        # not `make` first: each of the two would look at every target
+        'cmake ../smach_oracle {} -DCMAKE_INSTALL_PREFIX="$PWD/../installed"; '
+        'make -j2 install'.format(PYTHON),
         top / 'out',
     )
     (top / 'smach_oracle').rename(top / 'moved_away')
