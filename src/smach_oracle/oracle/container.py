@@ -7,6 +7,7 @@ import smach
 from .asking.question import Expert
 from .errors import SettingsError
 from .execution.boundary import before_step
+from .execution.settings_check import check_arguments
 from .execution.step import Step
 from .execution.transitions import end_plainly
 from .execution.trial import ContainerRun
@@ -82,6 +83,7 @@ class OracleContainer(smach.StateMachine):
 
         :raises SettingsError: naming key, value and what is allowed.
         """
+        check_arguments(name, expert, recover, strict, health)
         checked = as_settings(settings, preconditions)
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
         tree = Tree(OracleContainer, recover, expert, health)
@@ -124,6 +126,7 @@ class OracleContainer(smach.StateMachine):
 
         :raises SettingsError: naming key, value and what is allowed.
         """
+        check_arguments(name, expert, recover, strict, health)
         checked = as_settings(settings, preconditions)
         tree = Tree(OracleContainer, recover, expert, health)
         within = checked.nested if nested is None else checked_nested('nested', nested)

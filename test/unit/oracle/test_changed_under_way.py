@@ -11,6 +11,7 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.smach_private import iterated_state_of, set_items
 
 
 def items_of(state: smach.State, *items: Any) -> smach.Iterator:
@@ -98,3 +99,25 @@ def test_a_child_that_a_precondition_forks_ends_with_its_function() -> None:
     except AssertionError:
         os.kill(child, signal.SIGKILL)
         raise
+
+
+class OwnIterator(smach.Iterator):
+    """Executes by itself, so that it asks no hook of the engine's."""
+
+    def execute(self, *args: Any) -> Any:
+        """Execute as its base does."""
+        return smach.Iterator.execute(self, *args)
+
+
+def test_a_state_that_was_exchanged_while_an_iterator_executes_stays() -> None:
+    other, items = Scripted(), [3]
+
+    def exchange(*args: Any) -> str:
+        set_items(iterator, items, other)
+        return 'ok'
+
+    iterator = OwnIterator(['done', 'aborted'], [], [], it=[1], exhausted_outcome='done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', Scripted(exchange), loop_outcomes=['ok'])
+    assert OracleContainer.wrap(machine_of(iterator)).execute() == 'done'
+    assert iterated_state_of(iterator) is other and iterator._items is items

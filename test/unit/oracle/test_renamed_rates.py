@@ -108,6 +108,21 @@ def test_one_that_was_renamed_inherits_once_and_the_log_says_it(tmp_path, progra
         assert told == (4, 4, 1), 'NEW was renamed again'
 
 
+def test_the_log_says_whose_rates_it_has_and_warns_where_they_may_be_anothers(tmp_path, log):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+
+    def run(name):
+        del log[:]
+        Watched(chain_of(Scripted('aborted')), name=name, settings=settings).run()
+        gc.collect()
+        return [line for line in log if 'rates.json' in line[1] and 'is new there' in line[1]]
+
+    assert run('') == []
+    for name, level in (('FIRST', 'info'), ('SECOND', 'warn')):
+        ((found, text),) = run(name)
+        assert found == level and repr(name) in text
+
+
 def test_one_that_never_came_to_its_last_states_hands_its_rates_on_once(tmp_path):
     settings = {'rates_file': str(tmp_path / 'rates.json'), 'max_recoveries': 2}
 

@@ -435,3 +435,38 @@ def test_transitions_are_counted():
         ('A', 'ok', 'B'): 3,
         ('B', 'ok', 'done'): 3,
     }
+
+
+def test_it_logs_what_it_logs_without_an_oracle_in_every_trial(log):
+    """Also where it has come the same way before."""
+    bare, machine = chain_of(Scripted(), Scripted()), chain_of(Scripted(), Scripted())
+    OracleContainer.wrap(machine)
+    trials = []
+    for each in (bare, machine, machine):
+        del log[:]
+        assert each.execute() == 'done'
+        trials.append([line for line in log if line[1].startswith('State machine')])
+    assert len(trials[0]) == 3
+    assert trials[1:] == [trials[0]] * 2
+
+
+@pytest.mark.parametrize(
+    'argument, value, allowed',
+    [
+        ('name', None, 'a string'),
+        ('name', 5, 'a string'),
+        ('expert', 'eva', 'an Expert, or None'),
+        ('expert', object, 'an Expert, or None'),
+        ('recover', 'no way', 'true or false'),
+        ('recover', None, 'true or false'),
+        ('strict', 'perhaps', 'true or false'),
+        ('health', 'ok', 'a function, or None'),
+    ],
+)
+def test_wrong_arguments_are_refused_before_anything_is_changed(argument, value, allowed):
+    machine = chain_of(Scripted())
+    with pytest.raises(SettingsError, match='{}: .* allowed: {}'.format(argument, allowed)):
+        OracleContainer.wrap(machine, **{argument: value})
+    assert type(machine) is smach.StateMachine and 'ORACLE' not in machine.get_children()
+    with pytest.raises(SettingsError, match='{}: .* allowed: {}'.format(argument, allowed)):
+        OracleContainer(['done'], **{argument: value})

@@ -8,7 +8,7 @@ from ..errors import SettingsError
 from ..machine.nesting import nodes_of, paths_below
 from ..machine.places import allowed_for, why_unfit
 from ..machine.tree_node import TreeNode
-from ..settings.checks import STATE
+from ..settings.checks import STATE, flag
 from ..settings.names import UnfitKind, UnfitName, did_you_mean, matches
 from ..settings.preconditions import PreconditionSpec
 from ..settings.settings import GROUPS
@@ -16,6 +16,24 @@ from ..smach_private import states_of
 
 # settings that keep a state from being run where, or for longer than, its author wants
 PROTECTIONS = ('on_retry', 'preconditions', 'time_limit_s')
+
+
+def check_arguments(
+    name: object, expert: object, recover: object, strict: object, health: object
+) -> None:
+    """Check what a machine is put under an oracle with, beside its settings.
+
+    :raises SettingsError: naming the argument, its value and what is allowed.
+    """
+    if not isinstance(name, str):
+        raise SettingsError('name', name, 'a string')
+    if expert is not None and not callable(getattr(expert, 'ask', None)):
+        raise SettingsError('expert', expert, 'an Expert, or None')
+    flag('recover', recover)
+    if not callable(strict):
+        flag('strict', strict)
+    if health is not None and not callable(health):
+        raise SettingsError('health', health, 'a function, or None')
 
 
 def check_names(top: TreeNode) -> None:
