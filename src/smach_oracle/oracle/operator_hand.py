@@ -219,10 +219,10 @@ class OperatorHand:
     def begins_in(self, state: str) -> None:
         """Note that a viewer has this machine, which does not run, begin in a state.
 
-        A state that is not repeated by itself is then asked about.
+        A state that is not repeated by itself is then asked about. Between two trials that changes
+        nothing: what was done is forgotten as a trial begins.
         """
-        if self._top.tree.control.in_trial:
-            note_initial(self._node, state)
+        note_initial(self._node, state)
 
     def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
         control = self._top.tree.control
@@ -339,7 +339,7 @@ class OperatorHand:
     def _told(self, command: str, text: str, by: str, target: str = '') -> str:
         top = self._top
         smach.loginfo('{}: {}{}: {}'.format(top.path, command, ' by ' + by if by else '', text))
-        if top.tree.control.in_trial:
+        if top.tree.trial_id:  # no event comes before the first trial, nor behind the end of one
             top.emit(EventKind.OPERATOR_COMMAND, outcome=command, target=target, by=by, text=text)
         return text
 

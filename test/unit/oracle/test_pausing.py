@@ -296,3 +296,13 @@ def test_a_concurrence_is_no_state_that_runs_to_its_end_where_its_states_do() ->
         assert gate.entered.wait(20)
         assert held.hand.pause() == ('TOP is paused; runs to its end: A in TOP/BOTH/INNER')
         gate.opened.set()
+
+
+def test_what_an_operator_wants_between_two_trials_is_no_event_of_either() -> None:
+    held = Held(chain_of(Scripted()))
+    for _ in range(2):
+        held.hand.pause('eva')
+        held.hand.resume('eva')
+        assert not held.of(EventKind.OPERATOR_COMMAND)
+        assert held.run() == 'done'
+        assert held.events[-1].kind is EventKind.TRIAL_END

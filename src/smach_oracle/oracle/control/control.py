@@ -124,7 +124,6 @@ class Control:
         self.paused = False
         self.paused_by = ''
         self.is_set = False
-        self.in_trial = False
 
     # -- of the machines
 
@@ -134,12 +133,10 @@ class Control:
             self._jumps.clear()
             self._moving.clear()
             self._stop = None  # of a stop that came between two trials
-            self.in_trial = True
             self._note_change()
 
     def end_trial(self) -> None:
         """Tell nothing more of this trial."""
-        self.in_trial = False
         with self._changed:
             self._stop = None
             self._note_change()

@@ -230,10 +230,10 @@ class History:
             raise ValueError('that is no history: {}'.format(err)) from err
         self.visits = _CountedVisits(visits, maxlen=self.visits.maxlen)
         self.visits.added = number
-        self._failures.clear()
-        self._failures.extend(
+        now = (
             each._replace(state=there(each.state), anchor=there(each.anchor)) for each in failures
         )
+        self._failures = deque(now, maxlen=_MOST_FAILURES)
 
     def latest(self) -> Tuple[Visit, ...]:
         """Return the latest visits, oldest first."""

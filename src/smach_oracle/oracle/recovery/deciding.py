@@ -97,14 +97,12 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
     record, policy, budget = recovery.record, recovery.node.in_force.policy, recovery.budget
     streak = _streak(recovery)
     chosen = _first_way(recovery, situation, ways_on(recovery, why_not_above), streak)
-    if chosen is None:
-        recovery.choice, why = None, policy.why(recovery.situation or situation)
-        return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
-    spent = _take_recovery(recovery, policy.most_of_trial)
-    if spent:  # by others meanwhile
+    spent = '' if chosen is None else _take_recovery(recovery, policy.most_of_trial)
+    if chosen is None or spent:  # by others meanwhile
         recovery.choice = None
-        decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
-        return decider, recovery.facts(Action.ASK, blocked=spent)
+        decider = Decider.BUDGET if spent and budget.why_no_recovery() else Decider.POLICY
+        why = spent or policy.why(recovery.situation or situation)
+        return decider, recovery.facts(Action.ASK, blocked=why)
     recovery.jump_path = chosen.option.jump_path
     streak.leaves = bool(chosen.option.jump_path.left_containers)
     facts = recovery.facts(
