@@ -40,12 +40,13 @@ BESIDE_OTHERS = tuple(
         'trial_speed',
     )
 )
-# those with most to compute are begun first, so that none of them is left alone at the end
+# those with most to compute, or to wait, are begun first: none of them is left alone at the end
 LONGEST = (
     'unit/simulation',
     'unit/oracle',
     'unit/ros',
     'package/test_build.py',
+    'unit/store',  # it waits for the disk: last of all it would leave a core idle for a minute
     'unit/borders',
     'unit/pr2',
     'unit/house',
