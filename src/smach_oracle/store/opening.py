@@ -14,6 +14,7 @@ from .accepting import prepare, put_in_doubt
 from .errors import StoreDamaged, StoreError
 from .soundness import ACCEPT, LOG, Content, Files, examined, missed
 from .tables import (
+    BUSY_S,
     FORMAT,
     MAGIC,
     connect,
@@ -28,9 +29,10 @@ from .tables import (
 # process closes a file, it loses all locks that it has on it (POSIX, fcntl), and another program
 # could then take the log away
 _open_here: Dict[Tuple[int, int], 'weakref.WeakSet[object]'] = {}
-# waits before a store that looks damaged is looked at again: a program that begins or ends changes
-# several files
+# waits before a store that looks damaged, or whose log goes meanwhile, is looked at again: a
+# program that begins or ends changes several files
 LOOKS_AGAIN_S = (0.05, 0.2)
+_LOCKED_S = 0.02  # before a log is begun again that another program has kept from it
 
 
 _looking = threading.Lock()  # held from the look at the files until the store is noted
@@ -67,6 +69,22 @@ def _is_open_here(where: str) -> bool:
         return bool(_open_here.get(_file_of(where)))
     except OSError:
         return False
+
+
+def _begin_log(database: sqlite3.Connection) -> None:
+    """Have SQLite write a log, once no other program begins or ends its own.
+
+    SQLite waits for locks by itself, but not for this one.
+    """
+    until_s = time.monotonic() + BUSY_S
+    while True:
+        try:
+            database.execute('PRAGMA journal_mode = WAL')
+            return
+        except sqlite3.OperationalError:
+            if time.monotonic() > until_s:
+                raise
+            time.sleep(_LOCKED_S)
 
 
 class Opening:
@@ -109,7 +127,7 @@ class Opening:
         for waits_s in LOOKS_AGAIN_S:
             try:
                 return self._checked()
-            except StoreDamaged:
+            except (StoreDamaged, FileNotFoundError):
                 time.sleep(waits_s)
         return self._checked()
 
@@ -182,7 +200,7 @@ class Opening:
                 if self.is_damaged:
                     put_in_doubt(database, self._accepts)
                 self._begin(content_of(database))
-                database.execute('PRAGMA journal_mode = WAL')
+                _begin_log(database)
                 database.execute('PRAGMA synchronous = ' + synchronous)
                 try_to_write(database)
             return database

@@ -2,7 +2,9 @@
 
 import os
 import sqlite3
+import subprocess
 import sys
+import time
 
 import pytest
 
@@ -201,3 +203,30 @@ def test_a_store_cut_off_anywhere_has_what_was_committed_before(path, tmp_path):
         cut.add(number, [moment(2)])
         cut.close()
     assert found == {1, 2}
+
+
+BEGINS_AND_ENDS = """
+import sys, time, os
+from smach_oracle.store.store_file import NewTrial, StoreFile
+time.sleep(max(0.0, float(sys.argv[2]) - time.time()))
+for number in range(12):
+    for path in sys.argv[1] + str(number), sys.argv[1]:
+        store = StoreFile(path, "OFF")
+        trial = NewTrial("T", "{}-{}".format(os.getpid(), number), ("i", ""), 0)
+        store.end_trial(store.begin_trial(trial), 1.0, "ok")
+        store.close()
+"""
+
+
+def test_programs_that_begin_and_end_at_once_open_new_and_old_stores(tmp_path):
+    """SQLite does not wait for a lock where it begins a log, and a log goes with its last user."""
+    for number in range(3):
+        arguments = [str(tmp_path / 'robot{}.db'.format(number)), str(time.time() + 1.0)]
+        programs = [
+            subprocess.Popen(
+                [sys.executable, '-c', BEGINS_AND_ENDS, *arguments],
+                env=dict(os.environ, PYTHONPATH=os.pathsep.join(sys.path)),
+            )
+            for _ in range(6)
+        ]
+        assert [each.wait(60) for each in programs] == [0] * 6
