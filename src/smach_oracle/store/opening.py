@@ -32,8 +32,7 @@ _open_here: Dict[Tuple[int, int], 'weakref.WeakSet[object]'] = {}
 # waits before a store that looks damaged, or whose log goes meanwhile, is looked at again: a
 # program that begins or ends changes several files
 LOOKS_AGAIN_S = (0.05, 0.2)
-_LOCKED_S = 0.02  # before a log is begun again that another program has kept from it
-
+_LOCKED_S = 0.02  # wait before the next try to begin a log
 
 _looking = threading.Lock()  # held from the look at the files until the store is noted
 
@@ -81,8 +80,8 @@ def _begin_log(database: sqlite3.Connection) -> None:
         try:
             database.execute('PRAGMA journal_mode = WAL')
             return
-        except sqlite3.OperationalError:
-            if time.monotonic() > until_s:
+        except sqlite3.OperationalError as err:
+            if 'locked' not in str(err) or time.monotonic() > until_s:
                 raise
             time.sleep(_LOCKED_S)
 
