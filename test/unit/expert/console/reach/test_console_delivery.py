@@ -1,7 +1,6 @@
 """Messages sent to real HTTP and SMTP servers, and to those that fail, hang and refuse."""
 
 import base64
-import contextlib
 import email
 import email.policy
 import logging
@@ -15,7 +14,6 @@ import rospy
 from expert_fixtures import make_question
 from receiving import PASSWORD
 
-from smach_oracle.expert.console.reach import delivery
 from smach_oracle.expert.console.reach.calls_text import called_question
 from smach_oracle.expert.console.reach.delivery import NotDelivered, deliver
 from smach_oracle.expert.console.reach.on_call import MailServer, OnCallList, Receiver
@@ -42,27 +40,6 @@ def folder(tmp_path_factory):
     receiving.make_certificate(str(made))
     receiving.make_certificate(str(made), 'other')
     return made
-
-
-@pytest.fixture
-def serve():
-    """A function that has a server stopped at the end."""
-    with contextlib.ExitStack() as stack:
-
-        def begin(server):
-            stack.callback(server.stop)
-            if isinstance(server, receiving.MailServer):
-                server.start()
-            return server
-
-        yield begin
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    """Short limits: real ones are tried by nobody who waits."""
-    monkeypatch.setattr(delivery, 'LIMIT_S', 1.5)
-    monkeypatch.setattr(delivery, 'STEP_LIMIT_S', 0.5)
 
 
 def post(url, form='json', ca_file='', authorization=None, questions=()):

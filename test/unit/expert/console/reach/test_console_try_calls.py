@@ -1,15 +1,12 @@
 """The test message of an on-call list: servers take it, refuse it, hang, or are not there."""
 
-import contextlib
 import time
 from datetime import datetime
 
-import pytest
 import receiving
 from receiving import PASSWORD
 
 from smach_oracle.experiment.launching import free_port
-from smach_oracle.expert.console.reach import delivery
 from smach_oracle.expert.console.reach.on_call import (
     MailServer,
     OnCallList,
@@ -21,20 +18,6 @@ from smach_oracle.expert.console.reach.secret_file import Secret
 from smach_oracle.expert.console.reach.try_calls import SENTENCE, try_calls
 
 ORIGIN = 'https://robots.example.org'
-
-
-@pytest.fixture
-def serve():
-    """A function that has a server stopped at the end."""
-    with contextlib.ExitStack() as stack:
-
-        def begin(server):
-            stack.callback(server.stop)
-            if isinstance(server, receiving.MailServer):
-                server.start()
-            return server
-
-        yield begin
 
 
 def on_call_of(mail_port, **urls):
@@ -50,9 +33,7 @@ def on_call_of(mail_port, **urls):
     return OnCallList(people, (), server)
 
 
-def test_each_is_told_apart_and_one_that_hangs_delays_nobody(serve, monkeypatch):
-    monkeypatch.setattr(delivery, 'LIMIT_S', 1.5)
-    monkeypatch.setattr(delivery, 'STEP_LIMIT_S', 0.5)
+def test_each_is_told_apart_and_one_that_hangs_delays_nobody(serve, impatient):
     good, mail = serve(receiving.WebhookServer()), serve(receiving.MailServer())
     refuses = serve(receiving.WebhookServer([404], answer=PASSWORD.encode()))
     rude = serve(receiving.RudeServer(receiving.hangs))
