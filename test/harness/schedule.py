@@ -2,8 +2,8 @@
 
 Rostests wait most of their time: for nodes that start, for time to pass, for masters that come
 back. All others compute. Three that wait run beside two that compute. Tests and linters that
-compute give way (`processes.NICE`), so that a rostest finds the machine almost idle, and no core
-is ever idle. Benchmarks of wall-clock time run alone, at the end.
+compute give way (`processes.NICE`), so that a rostest finds the machine almost idle, and hardly
+ever a core is idle. Benchmarks of wall-clock time run alone, at the end.
 """
 
 import sys

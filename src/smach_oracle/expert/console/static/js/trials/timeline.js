@@ -28,7 +28,7 @@ export class Timeline {
     this.handle = h('div', { class: 'cursor-handle' });
     this.axis = h('div', { class: 'axis' });
     this.slider = h('div', { class: 'cursor-rail', role: 'slider', tabindex: '0',
-      'aria-label': 'Time in the trial', 'aria-valuemin': 0, 
+      'aria-label': 'Time in the trial', 'aria-valuemin': 0,
       onkeydown: (event) => replay.key(event) },
     this.axis, this.handle);
     this.root = h('div', { class: 'timeline' }, this.slider, this.canvas);
