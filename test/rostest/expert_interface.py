@@ -77,15 +77,11 @@ class TestInterfaces(unittest.TestCase):
             self.offer, self.question, self.cancelled, lambda *what: self.told.append(what)
         )
 
-    def taken(self):
-        """The answer of the interface as the oracle takes it; None where it does not."""
-        try:
-            answer = self.run_interface()
-            if answer is not None:
-                check_answer(answer, choices_of(self.question))
-        except AnswerError:
-            return None
-        return answer
+    def why_not_taken(self):
+        """Why the oracle does not take the answer of the interface, as the expert is told."""
+        with self.assertRaises(AnswerError) as raised:
+            check_answer(self.run_interface(), choices_of(self.question))
+        return str(raised.exception)
 
     def listed(self):
         """This test's question: that of the test before may not have left the list yet."""
@@ -154,9 +150,21 @@ class TestInterfaces(unittest.TestCase):
             ),
         ]
         self.interface(lambda server: getattr(server, 'set_' + results[0][0])(results.pop(0)[1]))
-        for _ in range(4):
-            self.assertIsNone(self.taken())
+        for why in ('failed: the arm is stuck', 'finished', 'other', 'grasped'):
+            self.assertIn(why, self.why_not_taken())
         self.assertEqual(results, [])
+
+    def test_an_interface_that_refuses_says_why(self):
+        server = actionlib.ActionServer(
+            '/assist',
+            SharedAutonomyAction,
+            lambda handle: handle.set_rejected(SharedAutonomyResult(), 'busy with DETECT'),
+            auto_start=False,
+        )
+        self.addCleanup(server.stop)
+        server.start()
+        with self.assertRaisesRegex(InterfaceError, '^refused it: busy with DETECT$'):
+            self.run_interface()
 
     def test_a_preempt_stops_the_interface_at_once(self):
         preempted = threading.Event()

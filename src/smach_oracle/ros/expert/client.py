@@ -42,6 +42,7 @@ SERVER_WAIT_S = 5.0
 # the server's word that nobody answered is better than our own clock's, where it comes soon
 _EXPIRY_GRACE_S = 1.0
 _RETRY_S = 0.3
+_ENDED = {GoalStatus.REJECTED: 'refused it', GoalStatus.ABORTED: 'failed'}
 
 
 class ExpertQueryClient(Expert):
@@ -94,18 +95,19 @@ class ExpertQueryClient(Expert):
         cancelled: threading.Event,
         progress: Progress,
     ) -> Optional[Answer]:
-        """Run a shared-autonomy interface. Return None where it fails or is cancelled.
+        """Run a shared-autonomy interface. Return None where it is cancelled.
 
         It is started where it is not there.
 
-        :raises InterfaceError: where it is not there, and cannot be started or does not come up.
+        :raises InterfaceError: where it is not there, and cannot be started or does not come up,
+            where it ends without a result, and where its outputs cannot be read.
         """
         progress('interface_start', offer.name, '')
         announcement = self._announce(offer, question)
         answer = None
         try:
             result = self._run(offer, question, cancelled)
-            answer = _to_supersede(offer, result) if result is not None else None
+            answer = None if result is None else _to_supersede(result)
         finally:
             if announcement is not None:
                 announcement.cancel()
@@ -189,10 +191,9 @@ class ExpertQueryClient(Expert):
         while not (cancelled.is_set() or rospy.is_shutdown()):
             event = sent.poll()
             if event is not None and event.status:
-                return _interface_result(offer, event)
+                return _interface_result(event)
             if event is None and _server_lost(link, sent, time.monotonic()):
-                rospy.logwarn('Interface %s: its action server %s is gone', offer.name, link.name)
-                break
+                raise InterfaceError('its action server {} is gone'.format(link.name))
         sent.cancel()
         return None
 
@@ -325,19 +326,16 @@ def _advertised(link: GoalLink) -> bool:
     return any(topic == link.name + '/status' for topic, _ in published)
 
 
-def _interface_result(offer: InterfaceOffer, event: GoalEvent) -> Optional[SharedAutonomyResult]:
-    if event.status == GoalStatus.SUCCEEDED and event.result is not None:
-        return event.result
-    rospy.logwarn(
-        'Interface %s ended as %s%s',
-        offer.name,
-        GoalStatus.to_string(event.status),
-        ': ' + event.result.text if event.result is not None and event.result.text else '',
-    )
-    return None
+def _interface_result(event: GoalEvent) -> SharedAutonomyResult:
+    result: Optional[SharedAutonomyResult] = event.result
+    if event.status == GoalStatus.SUCCEEDED and result is not None:
+        return result
+    ended = _ENDED.get(event.status) or 'ended as ' + GoalStatus.to_string(event.status)
+    why = ('' if result is None else result.text) or event.text
+    raise InterfaceError('{}: {}'.format(ended, why) if why else ended)
 
 
-def _to_supersede(offer: InterfaceOffer, result: SharedAutonomyResult) -> Optional[Answer]:
+def _to_supersede(result: SharedAutonomyResult) -> Answer:
     """Return the interface's result as an answer.
 
     The caller checks whether it fits the question.
@@ -345,8 +343,7 @@ def _to_supersede(offer: InterfaceOffer, result: SharedAutonomyResult) -> Option
     try:
         outputs = decode_all(result.outputs)
     except UserdataCodecError as err:
-        rospy.logwarn('Interface %s: %s', offer.name, err)
-        return None
+        raise InterfaceError(str(err)) from err
     # no `by`: the decision was that of the expert who started the interface
     return Answer(
         AnswerKind.SUPERSEDE, outcome=result.outcome, outputs=outputs or None, why=result.text

@@ -36,7 +36,7 @@ function failureFacts(question) {
       continuous && chip('continuous', 'warn', CONTINUOUS))),
     fact('Asked because', reason),
     fact('Recoveries spent', recoveries),
-    tried.length > 0 && fact('The oracle tried',
+    tried.length > 0 && fact('Tried so far',
       h('ol', { class: 'tried' }, tried.map((step) => h('li', {}, step)))),
     deadline !== null && fact('If nobody answers', fallback || 'the fallback happens'),
   ];
