@@ -52,6 +52,21 @@ import("/static/js/questions/queue_wishes.js").then(({ wanted, grouped, advice, 
   done([orders, groups, advised, [causeOf("Traceback:\\n  line 1\\nKeyError: x\\n"), causeOf("")]]);
 });"""
 
+# signs of made-up robots, and whether they have the same colours whichever of them asks first
+MARKS = """
+const [names, done] = arguments;
+const path = "/static/js/page/robot_mark.js";
+const marks = async (part, first) => {
+  const { knowRobots, robotMark } = await import(path + "?" + part);
+  knowRobots(first);
+  return names.map((name) => {
+    const mark = robotMark(name);
+    return [mark.textContent, mark.style.getPropertyValue("--hue")];
+  });
+};
+Promise.all([marks("1", names), marks("2", [...names].reverse())]).then(([one, other]) => (
+  done([one.map(([sign]) => sign), String(one) === String(other)])));"""
+
 # in the list of two made-up questions: the cards that change as the same two are told again, and
 # as the second one is claimed; then how the times of the first one have passed without a drawing
 DRAWN = """
@@ -267,6 +282,15 @@ class Queue(ConsolePage, unittest.TestCase):
         self.assertEqual(groups, [['a', 'c'], ['b'], ['d']])
         self.assertEqual(advised, ['R because', 'H ', None])
         self.assertEqual(causes, ['KeyError: x', ''])
+
+    def test_7_robots_keep_their_signs_and_colours(self):
+        for names, signs in (
+            (['/robot_7', '/robot_12'], ['7', '12']),
+            (['/r1/task', '/r2/task'], ['1', '2']),
+            (['/fleet/alpha', '/fleet/bravo'], ['al', 'br']),
+            (['/alpha/task', '/bravo/task', '/bravo/arm'], ['al', 'ta', 'ar']),
+        ):
+            self.assertEqual(self.browser.driver.execute_async_script(MARKS, names), [signs, True])
 
     def test_7_a_card_is_drawn_again_only_where_something_about_its_question_is_other(self):
         self.assertEqual(

@@ -5,10 +5,6 @@ import { h, setText } from './dom.js';
 /** @type {{ [rank in server.FailureClass]: string }} */
 export const FAILURE_CLASSES = { 0: '', 1: 'low', 2: 'moderate', 3: 'high' };
 
-const GOLDEN = 137.5; // degrees: neighbours on a list are far apart on the circle of colours
-/** @type {Map<string, number>} */
-const places = new Map(); // of each robot that this page has seen, in the order of their coming
-
 /** @param {number} seconds */
 export function duration(seconds) {
   const whole = Math.max(0, Math.floor(seconds));
@@ -119,24 +115,4 @@ export function rateBar(rate, share, text) {
  */
 export function chip(text, kind = '', title) {
   return h('span', { class: 'chip ' + kind, title }, text);
-}
-
-/**
- * Its number, or the first letters of its name.
- * @param {string} name such as /fleet/robot_7
- */
-function signOf(name) {
-  const last = name.split('/').pop() || name;
-  return /\d{1,3}$/.exec(last)?.[0] || last.replace(/[^\p{L}\p{N}]/gu, '').slice(0, 2) || '?';
-}
-
-/**
- * The mark of a robot, beside its name: a colour and a sign, so that many are told
- * apart at a glance.
- * @param {string} name
- */
-export function robotMark(name) {
-  if (!places.has(name)) places.set(name, places.size);
-  const hue = Math.round((places.get(name) || 0) * GOLDEN + 250) % 360;
-  return h('span', { class: 'robot-mark', 'aria-hidden': true, '--hue': hue }, signOf(name));
 }

@@ -3,8 +3,9 @@
 // where the answer is not offered it is not sent, and that is said.
 import { NoReply, unlessLost } from '../page/connection.js';
 import { h } from '../page/dom.js';
-import { breakable, counted, duration, percent, robotMark } from '../page/format.js';
+import { breakable, counted, duration, percent } from '../page/format.js';
 import { keep, render } from '../page/redraw.js';
+import { robotMark } from '../page/robot_mark.js';
 
 /** @typedef {{ ok: boolean, words: string }} Check */
 /** @typedef {{ answer: server.Answer, words: string, offered: number, advised: number }} Offer */

@@ -4,9 +4,11 @@ import { waits } from '../page/alerts.js';
 import { wasMeant } from '../page/deliberate.js';
 import { h, pick } from '../page/dom.js';
 import {
-  FAILURE_CLASSES, breakable, chip, counted, percent, rateBar, robotMark, since, until,
+  FAILURE_CLASSES, breakable, chip, counted, percent, rateBar, since, until,
 } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
+import { knowRobots, robotMark, signOf } from '../page/robot_mark.js';
+import { robotsOf } from '../robots/fleet_facts.js';
 import { readersOf } from './onlookers.js';
 import { FILTERS, ORDERS, advice, causeOf, grouped, wanted } from './queue_wishes.js';
 
@@ -82,6 +84,7 @@ export class QueueTools {
  */
 export function queueList(app, cards, groups, ways) {
   const now = app.store.now();
+  knowRobots(robotsOf(app));
   cards.only(groups.flatMap(({ questions }) => questions.map(({ key }) => key)));
   let before = false; // a group with a head
   return groups.flatMap(({ alike, questions }) => {
@@ -123,8 +126,8 @@ function factsOf(app, question, chosen, now) {
   const { key, status, state, robot, path, what, text, holder, asked, deadline, rate, continuous,
     class: rank, interface: name } = question;
   return { key, status, state, robot, path, what, holder, asked, deadline, rate, continuous, rank,
-    name, chosen, cause: causeOf(text), advised: adviceOf(question), mine: app.isMine(question),
-    waiting: waits(question), readers: readersOf(app, key),
+    name, chosen, sign: signOf(robot), cause: causeOf(text), advised: adviceOf(question),
+    mine: app.isMine(question), waiting: waits(question), readers: readersOf(app, key),
     silent: Boolean(app.liveness.whoIsSilent(question)),
     urgent: deadline !== null && deadline - now < URGENT_S };
 }
