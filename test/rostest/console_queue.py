@@ -55,7 +55,7 @@ import("/static/js/questions/queue_wishes.js").then(({ wanted, grouped, advice, 
 # signs of made-up robots, and whether they have the same colours whichever of them asks first
 MARKS = """
 const [names, done] = arguments;
-const path = "/static/js/page/robot_mark.js";
+const path = "/static/js/robots/robot_mark.js";
 const marks = async (part, first) => {
   const { knowRobots, robotMark } = await import(path + "?" + part);
   knowRobots(first);

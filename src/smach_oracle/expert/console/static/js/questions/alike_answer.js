@@ -5,7 +5,7 @@ import { NoReply, unlessLost } from '../page/connection.js';
 import { h } from '../page/dom.js';
 import { breakable, counted, duration, percent } from '../page/format.js';
 import { keep, render } from '../page/redraw.js';
-import { robotMark } from '../page/robot_mark.js';
+import { robotMark } from '../robots/robot_mark.js';
 
 /** @typedef {{ ok: boolean, words: string }} Check */
 /** @typedef {{ answer: server.Answer, words: string, offered: number, advised: number }} Offer */

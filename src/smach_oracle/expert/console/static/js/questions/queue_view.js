@@ -7,8 +7,8 @@ import {
   FAILURE_CLASSES, breakable, chip, counted, percent, rateBar, since, until,
 } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
-import { knowRobots, robotMark, signOf } from '../page/robot_mark.js';
 import { robotsOf } from '../robots/fleet_facts.js';
+import { knowRobots, robotMark, signOf } from '../robots/robot_mark.js';
 import { readersOf } from './onlookers.js';
 import { FILTERS, ORDERS, advice, causeOf, grouped, wanted } from './queue_wishes.js';
 

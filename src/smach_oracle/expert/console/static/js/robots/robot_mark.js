@@ -1,7 +1,7 @@
 // @ts-check
 // The mark of a robot, beside its name: a colour and a sign, so that many are told apart at a
 // glance.
-import { h } from './dom.js';
+import { h } from '../page/dom.js';
 
 const GOLDEN = 137.5; // degrees: neighbours on a list are far apart on the circle of colours
 /** @type {Map<string, number>} */
