@@ -69,7 +69,7 @@ def claimed_while_another_goes(path, line):
     del other
     assert is_claimed(path, 'TASK', False), 'NEW lives, and the other went at line {}'.format(line)
     del new
-    assert is_claimed(path, 'TASK') == bool(owners)
+    assert is_claimed(path, 'TASK', True) == bool(owners)
     return not owners
 
 
@@ -88,7 +88,7 @@ def test_a_name_is_claimed_once_its_folder_is_there(tmp_path):
     claim(path, 'TASK', owner)
     assert is_claimed(path, 'TASK', False)
     del owner
-    assert not is_claimed(path, 'TASK')
+    assert not is_claimed(path, 'TASK', True)
 
 
 def test_a_folder_that_was_made_anew_is_claimed_in_place_of_the_old_one(tmp_path):
@@ -101,7 +101,7 @@ def test_a_folder_that_was_made_anew_is_claimed_in_place_of_the_old_one(tmp_path
     folder.mkdir()
     claim(path, 'TASK', owner)
     assert is_claimed(path, 'TASK', False)
-    assert not is_claimed(str(moved / 'rates.json'), 'TASK')
+    assert not is_claimed(str(moved / 'rates.json'), 'TASK', True)
 
 
 def test_a_child_keeps_no_claim_on_a_folder_that_was_replaced(tmp_path):
@@ -116,8 +116,8 @@ def test_a_child_keeps_no_claim_on_a_folder_that_was_replaced(tmp_path):
     with child_that_waits():
         assert is_claimed(str(moved / 'rates.json'), 'TASK', False)
         del owner, one, two
-        assert not is_claimed(str(moved / 'rates.json'), 'TASK')
-        assert not is_claimed(path, 'TASK')
+        assert not is_claimed(str(moved / 'rates.json'), 'TASK', True)
+        assert not is_claimed(path, 'TASK', True)
 
 
 def test_claims_leave_no_file_open_once_their_owners_are_gone(tmp_path):
@@ -146,7 +146,7 @@ def test_a_child_claims_for_itself_and_leaves_the_claim_of_its_parent(tmp_path):
     with child_that_waits(claims_again):
         owners.clear()
         assert is_claimed(path, 'TASK', False) and is_claimed(path, 'CHILD', False)
-    assert not is_claimed(path, 'TASK') and not is_claimed(path, 'CHILD')
+    assert not is_claimed(path, 'TASK', True) and not is_claimed(path, 'CHILD', True)
 
 
 def test_a_child_that_claims_nothing_keeps_no_claim(tmp_path):
@@ -155,4 +155,4 @@ def test_a_child_that_claims_nothing_keeps_no_claim(tmp_path):
     with child_that_waits():
         assert is_claimed(path, 'TASK', False)
         del owner
-        assert not is_claimed(path, 'TASK'), 'the child lives'
+        assert not is_claimed(path, 'TASK', True), 'the child lives'

@@ -75,7 +75,7 @@ def claim(path: str, name: str, owner: object) -> None:
         claims[key] = found
 
 
-def is_claimed(path: str, name: str, if_unknown: bool = True) -> bool:
+def is_claimed(path: str, name: str, if_unknown: bool) -> bool:
     """Whether a running program uses a name. `if_unknown`: on a file system without locks."""
     key = os.path.realpath(path), name
     try:

@@ -236,12 +236,17 @@ def _name_before(path: str, machines: Machines, learners: Sequence[Learner]) -> 
     ]
     if any(label in machines.get('', {}).get(place, {}) for place in own for label in own[place]):
         found.append('')
-    if any(is_claimed(path, name) for name in found):
+    free = _unclaimed(path, found)
+    if free != found:
         gc.collect()  # machines of this process that are gone may still claim their names
-    free = [name for name in found if not is_claimed(path, name, if_unknown=bool(name))]
+        free = _unclaimed(path, found)
     if not free:
         return None
     return max(free, key=lambda each: (bool(each), sum(map(len, machines[each].values()))))
+
+
+def _unclaimed(path: str, names: Sequence[str]) -> List[str]:
+    return [name for name in names if not is_claimed(path, name, if_unknown=bool(name))]
 
 
 def _tell_other_rule(path: str, name: str, told: object, rule: FailureRule) -> None:
