@@ -36,7 +36,7 @@ class FakeArm:
     what is no number).
     """
 
-    def __init__(self):
+    def __init__(self, below=''):
         self._lock = threading.Lock()
         self._positions = np.array(READY)
         self.moved_s = 0.0  # monotonic, of the last change
@@ -44,13 +44,15 @@ class FakeArm:
         self.leads = []  # rad, of each target before where the arm is
         self.grip_s = 0.05  # that a motion of the gripper takes
         self.grips = []  # of the gripper's motions: where to, and whether it came to its end
-        self._states = rospy.Publisher('joint_states', JointState, queue_size=10, tcp_nodelay=True)
+        self._states = rospy.Publisher(
+            below + 'joint_states', JointState, queue_size=10, tcp_nodelay=True
+        )
         self._gripper = actionlib.SimpleActionServer(
-            'gripper', GripperCommandAction, self._grip, auto_start=False
+            below + 'gripper', GripperCommandAction, self._grip, auto_start=False
         )
         self._gripper.start()
         self._commands = rospy.Subscriber(
-            'arm/command', JointTrajectory, self._move, queue_size=10, tcp_nodelay=True
+            below + 'arm/command', JointTrajectory, self._move, queue_size=10, tcp_nodelay=True
         )
         threading.Thread(target=self._tell_on, daemon=True).start()
 

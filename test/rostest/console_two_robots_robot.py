@@ -1,0 +1,69 @@
+#!/usr/bin/env python3
+"""A robot that neither sees nor grasps anything by itself. It tells, as a parameter, where it was
+told that the object is. Its interfaces lie in its own namespace.
+"""
+
+import rospy
+
+import smach
+from smach_oracle import OracleContainer
+
+OUTCOMES = ['succeeded', 'aborted', 'preempted']
+
+
+class Detect(smach.State):
+    """Always fails."""
+
+    def __init__(self):
+        smach.State.__init__(self, OUTCOMES, output_keys=['table', 'objects', 'sizes'])
+
+    def execute(self, ud):
+        return 'aborted'
+
+
+class Pick(smach.State):
+    """Always fails."""
+
+    def __init__(self):
+        smach.State.__init__(self, OUTCOMES, input_keys=['objects'], output_keys=['grasp'])
+
+    def execute(self, ud):
+        place = ud.objects[0].pose.position
+        rospy.set_param('~seen', [place.x, place.y, place.z])
+        return 'aborted'
+
+
+def main():
+    """One trial."""
+    rospy.init_node('robot')
+    sm = smach.StateMachine(OUTCOMES)
+    with sm:
+        smach.StateMachine.add('DETECT_TABLETOP', Detect(), {'succeeded': 'PICK'})
+        smach.StateMachine.add('PICK', Pick())
+    OracleContainer.wrap(
+        sm,
+        name='FETCH',
+        settings={
+            'policy': 'always_ask',
+            'expert': {
+                'interfaces': {
+                    'perception': {
+                        'action': 'perception_interface',
+                        'states': ['DETECT_TABLETOP'],
+                    },
+                    'manipulation': {
+                        'action': 'manipulation_interface',
+                        'states': ['PICK'],
+                        'node': 'smach_oracle manipulation_interface',
+                        'args': ['__name:=manipulation_interface'],
+                    },
+                },
+            },
+        },
+    )
+    sm.execute()
+    rospy.spin()
+
+
+if __name__ == '__main__':
+    main()
