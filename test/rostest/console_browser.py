@@ -36,7 +36,8 @@ NO_PLACE = """return import("/static/js/robots/graph_view.js").then(({ GraphView
   const states = [[1, 2, 3, 4], null].map((at) => ({ label: "S" + at, nested: false, at }));
   const view = new GraphView(() => {});
   view.set("/alpha", { path: "A", oracle: "O", drawn: true, size: [9, 9], states, outcomes: [],
-    edges: [], bundled: {}, refused: 0 });
+    edges: [], bundled: {}, refused: 0 },
+  { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] });
   return view.root.querySelectorAll(".state").length;
 })"""
 

@@ -1,13 +1,13 @@
 // @ts-check
 // Lists that change in place. What is pressed stays under the pointer until it is let go: around it
 // nothing comes or goes meanwhile, so that a click that has begun is not lost, nor lands elsewhere.
-import { h, keyOf, listenAs, nodesOf } from './dom.js';
+import { keyOf, listenAs, nodesOf } from './dom.js';
 
 const CLICK_MS = 100; // by then the click of what was let go has come
 const PRESSED = 'button, summary, [role="button"], .mark, .event';
 /** @type {WeakMap<Element, string>} */
 const drawn = new WeakMap(); // of what
-/** @type {WeakMap<Node, HTMLElement>} */
+/** @type {WeakMap<Node, Element>} */
 const kept = new WeakMap(); // by what stands for it in a view
 /** @type {WeakSet<Node>} */
 const own = new WeakSet(); // those that are kept: never matched with another element
@@ -18,19 +18,9 @@ let pressed = null;
 let timer = 0;
 
 /**
- * The element's children are these, in this order. Those that stay are not taken out, not even for
- * a moment: that would cost them focus and scroll position, and the click that has begun on them.
- * @param {Element} element
- * @param {...page.Child} children
- */
-export function arrange(element, ...children) {
-  whenLetGo(element, () => put(element, nodesOf(children)));
-}
-
-/**
  * What stands in a view for an element that is not made again: the view must not take it out of the
  * page, where it may have the focus.
- * @param {HTMLElement} element
+ * @param {Element} element
  */
 export function keep(element) {
   const place = document.createElement('template');
@@ -41,14 +31,16 @@ export function keep(element) {
 
 /**
  * An element becomes like a view of its kind, which was made again: this is how a panel changes.
- * @param {HTMLElement} element
- * @param {HTMLElement} view
+ * @param {Element} element
+ * @param {Element} view
  */
 export function render(element, view) { whenLetGo(element, () => { alike(element, view); }); }
 
 /**
  * As if the element's children were replaced by these, which were made again; but those that are
- * there become like them, each like the one of its kind and `key`.
+ * there become like them, each like the one of its kind and `key`. Those that stay are not taken
+ * out, not even for a moment: that would cost them focus and scroll position, and the click that has
+ * begun on them.
  * @param {Element} element
  * @param {...page.Child} children
  */
@@ -101,9 +93,9 @@ export function redrawWith(element, data, childrenOf) {
 
 /**
  * The same of a view.
- * @param {HTMLElement} element
+ * @param {Element} element
  * @param {unknown} data
- * @param {() => HTMLElement} viewOf
+ * @param {() => Element} viewOf
  */
 export function renderWith(element, data, viewOf) {
   if (isOther(element, data)) render(element, viewOf());
@@ -111,10 +103,10 @@ export function renderWith(element, data, viewOf) {
 
 /** An element for each of many things, which changes only where something about that one does. */
 export class Cards {
-  /** @param {'section' | 'button'} tag */
-  constructor(tag) {
-    this.tag = tag;
-    /** @type {Map<string, HTMLElement>} */
+  /** @param {() => Element} begin an empty one */
+  constructor(begin) {
+    this.begin = begin;
+    /** @type {Map<string, Element>} */
     this.known = new Map(); // by key
   }
 
@@ -122,10 +114,10 @@ export class Cards {
    * What stands for one in a view.
    * @param {string} key
    * @param {unknown} data
-   * @param {() => HTMLElement} viewOf
+   * @param {() => Element} viewOf
    */
   card(key, data, viewOf) {
-    const card = this.known.get(key) || h(this.tag, {});
+    const card = this.known.get(key) || this.begin();
     this.known.set(key, card);
     renderWith(card, data, viewOf);
     return keep(card);

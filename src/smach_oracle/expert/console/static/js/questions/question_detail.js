@@ -51,8 +51,8 @@ export class QuestionDetail {
     /** @type {InterfacePanel | null} */
     this.interfacePanel = null;
     this.interfaceSeen = false;
-    this.machine = new MachineView(machinesNow(app.store), () => {});
-    this.hand = new MachineHand(app);
+    this.machine = new MachineView(machinesNow(app.store), () => question, () => {});
+    this.hand = new MachineHand(app, () => question);
     this.camera = new SituationCamera(app, question);
     this.lastSeconds = new LastSeconds(app);
     this.way = h('div', {}, visitsCard(question));
@@ -72,8 +72,8 @@ export class QuestionDetail {
 
   build() {
     const { question } = this;
-    this.machine.show(question.robot, question.path);
-    this.hand.show(question.robot, question.path);
+    this.machine.draw();
+    this.hand.draw();
     return h('article', { class: 'detail', 'data-question': question.key }, this.top,
       this.perceptionPlace, this.interfacePlace,
       h('div', { class: 'detail-body' },
@@ -321,8 +321,8 @@ export class QuestionDetail {
     if (changed('replays')) this.lastSeconds.show(this.app.store.get('replays')?.[this.key]);
     if (changed('questions')) redraw(this.way, visitsCard(this.now || this.question));
     if (changed('questions', `live ${robot}`) || names?.some((name) => name.startsWith('graph '))) {
-      this.machine.update();
-      this.hand.update();
+      this.machine.draw();
+      this.hand.draw();
     }
     if (this.followUp) this.followUp.draw();
     this.showClaim();

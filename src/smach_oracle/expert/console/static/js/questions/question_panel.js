@@ -43,7 +43,7 @@ class QuestionPanel {
     this.missing = ''; // the question of an address, where it is not open
     this.tools = new QueueTools(() => this.showQueue());
     this.queue = h('div', { class: 'queue', 'aria-label': 'Open questions' });
-    this.cards = new Cards('button');
+    this.cards = new Cards(() => h('button', {}));
     this.side = h('aside', {});
     this.stage = h('div', { class: 'stage' });
     this.root = h('div', { class: 'panel questions' }, this.side, this.stage);

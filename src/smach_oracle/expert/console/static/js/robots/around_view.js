@@ -17,14 +17,16 @@ import { activeIn, focusState } from './focus_state.js';
 const MOST_WAYS = 40; // of each side
 
 export class AroundView {
-  /** @param {(path: string) => void} onOpen a nested container was chosen */
-  constructor(onOpen) {
+  /**
+   * @param {(path: string) => void} onOpen a nested container was chosen
+   * @param {() => void} onChoice a state was chosen
+   */
+  constructor(onOpen, onChoice) {
     this.onOpen = onOpen;
+    this.onChoice = onChoice;
     this.root = h('div', { class: 'around' });
     this.chosen = ''; // by a person; '': it follows
     this.place = ''; // robot and path
-    /** @type {() => void} */
-    this.again = () => {};
   }
 
   /**
@@ -32,7 +34,7 @@ export class AroundView {
    */
   choose(label) {
     this.chosen = label;
-    this.again();
+    this.onChoice();
   }
 
   /**
@@ -44,7 +46,6 @@ export class AroundView {
     const place = robot + ' ' + graph.path;
     if (place !== this.place) this.chosen = '';
     this.place = place;
-    this.again = () => this.set(robot, graph, machine);
     if (!graph.states.some(({ label }) => label === this.chosen)) this.chosen = '';
     const label = this.chosen || focusState(graph, machine) || graph.states[0]?.label || '';
     redrawWith(this.root, [label, graph, machine, this.chosen], () => [

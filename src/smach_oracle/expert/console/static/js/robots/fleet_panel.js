@@ -31,7 +31,7 @@ class FleetPanel {
     this.facts = [];
     /** @type {string[]} */
     this.order = []; // in which they are shown
-    this.cards = new Cards('section'); // by robot
+    this.cards = new Cards(() => h('section', {})); // by robot
     this.reply = { ok: true, message: '' };
     this.touchedAt = this.repliedAt = -Infinity; // ms
     this.timer = 0;

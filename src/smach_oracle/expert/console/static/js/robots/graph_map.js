@@ -2,6 +2,8 @@
 // A small picture of a whole drawing, in its corner, with a frame around what is seen. It is for
 // the pointer: the keyboard has search and arrow keys.
 import { svg } from '../page/dom.js';
+import { keep, redraw, render } from '../page/redraw.js';
+import { activeIn } from './focus_state.js';
 
 /** @typedef {import('./graph_viewport.js').Place} Place */
 /** @typedef {import('./graph_viewport.js').Seen} Seen */
@@ -16,56 +18,42 @@ export class GraphMap {
   constructor(onPlace) {
     this.onPlace = onPlace;
     this.states = svg('g', {});
-    this.frame = svg('rect', { class: 'map-frame' });
-    this.root = svg('svg', { class: 'graph-map', 'aria-hidden': 'true',
-      onpointerdown: (event) => this.press(event) }, this.states, this.frame);
-    /** @type {Map<string, SVGRectElement>} */
-    this.boxes = new Map(); // by label
-    this.scale = 1;
-    this.root.style.display = 'none';
-  }
-
-  /** @param {server.Graph} graph */
-  set({ states }) {
-    this.boxes = new Map(states.flatMap(({ label, at }) => (at ? [[label,
-      svg('rect', { x: at[0] - at[2] / 2, y: at[1] - at[3] / 2, width: at[2], height: at[3] })]]
-      : [])));
-    this.states.replaceChildren(...this.boxes.values());
+    this.root = svg('svg', { class: 'graph-map', hidden: true });
   }
 
   /**
-   * @param {string} failed
-   * @param {string[]} active
+   * @param {server.Graph} graph
+   * @param {machine.MachineState} machine
    */
-  mark(failed, active) {
-    for (const [label, box] of this.boxes) {
-      box.classList.toggle('failed', label === failed);
-      box.classList.toggle('active', active.includes(label));
-    }
+  set({ path, states }, machine) {
+    const active = activeIn(path, machine);
+    const failed = machine.failed[path]?.state;
+    redraw(this.states, states.map(({ label, at }) => at && svg('rect', {
+      class: label === failed ? 'failed' : active.includes(label) ? 'active' : '',
+      x: at[0] - at[2] / 2, y: at[1] - at[3] / 2, width: at[2], height: at[3] })));
   }
 
   /**
    * @param {Seen} seen
-   * @param {Size | null} size
+   * @param {Size} size
    */
   show({ x, y, width, height }, size) {
-    const whole = !size || this.boxes.size < FROM || (width >= size.width && height >= size.height);
-    this.root.style.display = whole ? 'none' : '';
-    if (whole || !size) return;
-    this.scale = Math.min(WIDEST / size.width, HIGHEST / size.height);
-    this.root.setAttribute('viewBox', [0, 0, size.width, size.height].join(' '));
-    this.root.setAttribute('width', String(size.width * this.scale));
-    this.root.setAttribute('height', String(size.height * this.scale));
-    const frame = { x, y, width, height };
-    for (const [name, value] of Object.entries(frame)) {
-      this.frame.setAttribute(name, String(value));
-    }
+    const whole = this.states.childElementCount < FROM
+      || (width >= size.width && height >= size.height);
+    const scale = Math.min(WIDEST / size.width, HIGHEST / size.height);
+    render(this.root, svg('svg', { class: 'graph-map', 'aria-hidden': 'true', hidden: whole,
+      viewBox: [0, 0, size.width, size.height].join(' '), width: size.width * scale,
+      height: size.height * scale, onpointerdown: (event) => this.press(event, scale) },
+    keep(this.states), svg('rect', { class: 'map-frame', x, y, width, height })));
   }
 
-  /** @param {PointerEvent} event */
-  press(event) {
+  /**
+   * @param {PointerEvent} event
+   * @param {number} scale
+   */
+  press(event, scale) {
     event.stopPropagation();
     const box = this.root.getBoundingClientRect();
-    this.onPlace([(event.clientX - box.left) / this.scale, (event.clientY - box.top) / this.scale]);
+    this.onPlace([(event.clientX - box.left) / scale, (event.clientY - box.top) / scale]);
   }
 }

@@ -1,18 +1,10 @@
 // @ts-check
 // The shapes of a drawn container: states, outcomes, edges, and ORACLE with its rail.
 import { svg } from '../page/dom.js';
+import { hue, percent, times } from '../page/format.js';
 
-/**
- * @typedef {object} EdgeShape
- * @property {SVGGElement} group
- * @property {SVGPathElement} line
- * @property {SVGTextElement} label
- * @property {string} from
- * @property {string} to
- * @property {string} outcome '' of the edges of ORACLE
- * @property {boolean} ofOracle
- */
-/** @typedef {ReturnType<typeof stateShape>} StateShape */
+/** @typedef {{ times: number, share: number }} Taken how often an edge was */
+/** @typedef {{ from: string, to: string, y: number, x: [number, number] }} OracleLine */
 
 const RAIL_GAP = 96; // px, from the states to the rail
 const RAIL_WIDTH = 64;
@@ -65,66 +57,84 @@ function shorten(text, width) {
 function translate(x, y) { return 'translate(' + x + ' ' + y + ')'; }
 
 /**
+ * A transition that dot has laid.
  * @param {server.GraphEdge} edge
- * @returns {EdgeShape}
+ * @param {Taken | undefined} taken
+ * @param {boolean} hot it was taken last
  */
-export function edgeShape({ from, outcome, to, points, label: place }) {
-  const line = svg('path', { class: 'edge', d: spline(points), 'marker-end': 'url(#arrow-edge)' });
-  const [x, y] = place || [points[0] || 0, points[1] || 0];
-  const label = svg('text', { class: 'edge-label', x, y: y + 4 }, outcome);
-  return { group: svg('g', {}, line, label), line, label, from, to, outcome, ofOracle: false };
+export function edgeShape({ from, outcome, to, points, label }, taken, hot) {
+  const [x, y] = label || points;
+  const arrow = hot ? 'hot' : taken ? 'used' : 'edge';
+  return edgeGroup(from + ' → ' + to, taken, hot,
+    svg('path', { class: 'edge', d: spline(points), 'marker-end': 'url(#arrow-' + arrow + ')' }),
+    svg('text', { class: 'edge-label', x, y: y + 4 },
+      outcome + (taken ? ' ' + percent(taken.share) : '')));
 }
 
 /**
- * A short line from a state to the rail, or back.
- * @param {string} from
- * @param {string} to
- * @param {[x1: number, y1: number, x2: number]} place
+ * A short line from a state to the rail, or back: it stands for all outcomes.
+ * @param {OracleLine} line
  * @param {number} rail
- * @returns {EdgeShape}
+ * @param {Taken | undefined} taken
+ * @param {boolean} hot it was taken last
+ * @param {boolean} toOracle
  */
-function oracleLine(from, to, [x1, y1, x2], rail) {
-  const line = svg('path', { class: 'edge oracle-edge',
-    d: 'M' + x1 + ' ' + y1 + 'L' + x2 + ' ' + y1 });
-  const label = svg('text', { class: 'edge-label oracle-label', x: rail - 8, y: y1 - 4,
-    'text-anchor': 'end' });
-  const group = svg('g', {}, line, label);
-  return { group, line, label, from, to, outcome: '', ofOracle: true };
+export function oracleEdgeShape({ from, to, y, x }, rail, taken, hot, toOracle) {
+  const arrow = 'url(#arrow-' + (hot ? 'failing' : 'oracle') + ')';
+  return edgeGroup(from + ' → ' + to, taken, hot,
+    svg('path', { class: 'edge oracle-edge', d: 'M' + x[0] + ' ' + y + 'L' + x[1] + ' ' + y,
+      'marker-end': taken && arrow }),
+    svg('text', { class: 'edge-label oracle-label', x: rail - 8, y: y - 4, 'text-anchor': 'end' },
+      taken && taken.times + (toOracle ? '× failed' : '×')));
+}
+
+/**
+ * @param {string} title
+ * @param {Taken | undefined} taken
+ * @param {boolean} hot
+ * @param {SVGElement[]} shapes
+ */
+function edgeGroup(title, taken, hot, ...shapes) {
+  return svg('g', { class: (taken ? 'used ' : '') + (hot ? 'hot' : '') }, shapes,
+    taken && svg('title', {}, title + ', ' + times(taken.times)));
 }
 
 /**
  * All edges of ORACLE.
  * @param {server.Graph} graph
- * @returns {EdgeShape[]}
+ * @returns {OracleLine[]}
  */
-export function oracleLines({ oracle, states, outcomes, ...graph }) {
-  const { rail } = measured({ oracle, states, outcomes, ...graph });
+export function oracleLines(graph) {
+  const { oracle, states, outcomes } = graph;
+  if (!oracle) return [];
+  const { rail } = measured(graph);
   const ofStates = states.flatMap(({ label, at }, index) => {
     if (!at) return [];
     const [x, y, width] = at;
     const shift = (index % 3 - 1) * 2;
     const side = x + width / 2;
-    return [oracleLine(label, oracle, [side, y + 7 + shift, rail], rail),
-      oracleLine(oracle, label, [rail, y - 9 + shift, side + 1], rail)];
+    return [{ from: label, to: oracle, y: y + 7 + shift, x: [side, rail] },
+      { from: oracle, to: label, y: y - 9 + shift, x: [rail, side + 1] }];
   });
   const ofOutcomes = outcomes.flatMap(({ label, at }) => (
-    at ? [oracleLine(oracle, label, [rail, at[1], at[0] + at[2] / 2 + 1], rail)] : []));
-  return [...ofStates, ...ofOutcomes];
+    at ? [{ from: oracle, to: label, y: at[1], x: [rail, at[0] + at[2] / 2 + 1] }] : []));
+  return /** @type {OracleLine[]} */ ([...ofStates, ...ofOutcomes]);
 }
 
 /**
  * The rail.
  * @param {server.Graph} graph
  * @param {string} id
+ * @param {boolean} active
  */
-export function oracleShape(graph, id) {
+export function oracleShape(graph, id, active) {
   const { rail, height } = measured(graph);
   const labels = [];
   for (let y = Math.min(60, height / 2); y < height; y += RAIL_LABELS) {
     labels.push(svg('text', { x: rail + RAIL_WIDTH / 2, y, class: 'oracle-name' },
       shorten(graph.oracle, 80)));
   }
-  return svg('g', { class: 'oracle', id },
+  return svg('g', { class: 'oracle' + (active ? ' active' : ''), id },
     svg('rect', { x: rail, y: 0, width: RAIL_WIDTH, height, rx: 12 }), labels);
 }
 
@@ -159,18 +169,23 @@ function openByKey(event, open) {
  * @param {server.Place} place
  * @param {string} id
  * @param {(() => void) | null} open where it is a container itself
+ * @param {machine.ShownRate | undefined} learned
+ * @param {string[]} kinds active, failed, found
  */
-export function stateShape(label, [x, y, width, height], id, open) {
-  const rate = svg('text', { y: 15, class: 'state-rate' });
-  const title = svg('title', {}, label);
+export function stateShape(label, [x, y, width, height], id, open, learned, kinds) {
+  const { rate = null, failures = 0, successes = 0 } = learned || {};
+  const words = rate === null ? ''
+    : `failed ${failures}/${failures + successes} · est. ${percent(rate)}`;
   const box = { width, height, rx: 10 };
-  const group = svg('g', { class: 'state' + (open ? ' nested' : ''), id, transform: translate(x, y),
-    onclick: open, onkeydown: open && ((event) => openByKey(event, open)),
-    tabindex: open ? '0' : null, role: open ? 'button' : null },
-  title, open && svg('rect', { class: 'behind', x: -width / 2 + 4, y: -height / 2 + 5, ...box }),
+  return svg('g', { class: ['state', open && 'nested', words && 'known', ...kinds].filter(Boolean)
+    .join(' '), id, transform: translate(x, y), '--hue': rate === null ? null : hue(rate),
+  onclick: open, onkeydown: open && ((event) => openByKey(event, open)),
+  tabindex: open ? '0' : null, role: open ? 'button' : null },
+  svg('title', {}, label + (words && ': ' + words)),
+  open && svg('rect', { class: 'behind', x: -width / 2 + 4, y: -height / 2 + 5, ...box }),
   svg('rect', { class: 'box', x: -width / 2, y: -height / 2, ...box }),
-  svg('text', { y: -3, class: 'state-name' }, shorten(label, width)), rate,
+  svg('text', { y: -3, class: 'state-name' }, shorten(label, width)),
+  svg('text', { y: 15, class: 'state-rate' }, words),
   svg('g', { class: 'failed-mark', transform: translate(width / 2 - 2, -height / 2 + 2) },
     svg('circle', { r: 9 }), svg('text', { y: 4 }, '!')));
-  return { group, rate, title, at: /** @type {[x: number, y: number]} */ ([x, y]) };
 }

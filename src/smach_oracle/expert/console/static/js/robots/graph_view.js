@@ -2,19 +2,17 @@
 // One container drawn from the positions that dot gave the server. ORACLE is a rail at the right
 // side: every state's edge to it and back is a short line, pale until it was used.
 import { h, svg } from '../page/dom.js';
-import { hue, percent, times } from '../page/format.js';
-import { whenLetGo } from '../page/redraw.js';
+import { Cards, redraw, whenLetGo } from '../page/redraw.js';
 import {
-  arrowHeads, edgeShape, measured, oracleLines, oracleShape, outcomeShape, stateShape,
+  arrowHeads, edgeShape, measured, oracleEdgeShape, oracleLines, oracleShape, outcomeShape,
+  stateShape,
 } from './graph_shapes.js';
-import { activeIn } from './focus_state.js';
+import { activeIn, focusState } from './focus_state.js';
 import { takeGraphKeys } from './graph_keys.js';
 import { GraphMap } from './graph_map.js';
 import { GraphViewport } from './graph_viewport.js';
 
-/** @typedef {import('./graph_shapes.js').EdgeShape} EdgeShape */
-/** @typedef {import('./graph_shapes.js').StateShape} StateShape */
-/** @typedef {{ times: number, share: number }} Taken how often an edge was */
+/** @typedef {import('./graph_shapes.js').Taken} Taken */
 
 const CLOSER = 1.3;
 
@@ -29,17 +27,12 @@ export class GraphView {
       onclick: () => this.viewport.setFollow(!this.viewport.follow) }, 'Follow');
     this.map = new GraphMap((at) => this.viewport.showMiddle(at));
     this.root = h('div', { class: 'graph-frame' }, this.drawing, this.map.root, this.tools());
-    this.robot = '';
-    /** @type {server.Graph | null} */
-    this.graph = null;
+    /** @type {server.GraphState[]} */
+    this.states = [];
+    this.focus = ''; // the state that failed or is active
+    this.found = ''; // the one that a person has searched
     this.key = ''; // of what is drawn
-    this.focusKey = ''; // of what is in view
-    /** @type {Map<string, StateShape>} */
-    this.states = new Map(); // by label
-    /** @type {Map<string, EdgeShape>} */
-    this.edges = new Map();
-    /** @type {SVGGElement | null} */
-    this.oracle = null;
+    this.shapes = newShapes();
     /** @type {GraphViewport} */
     this.viewport = new GraphViewport(this);
     this.viewport.setFollow(true);
@@ -59,51 +52,60 @@ export class GraphView {
 
   /**
    * @param {string} robot
-   * @param {server.Graph} graph
+   * @param {server.Graph} graph that is drawn
+   * @param {machine.MachineState} machine
    */
-  set(robot, graph) {
+  set(robot, graph, machine) {
     const key = JSON.stringify([robot, graph]);
-    if (key === this.key) return;
-    this.key = key;
-    this.robot = robot;
-    this.graph = graph;
-    this.layer.replaceChildren();
-    this.states.clear();
-    this.edges.clear();
-    this.oracle = null;
-    this.focusKey = '';
+    const focus = focusState(graph, machine);
+    const moves = key !== this.key || focus !== this.focus;
+    if (key !== this.key) this.shapes = newShapes();
+    Object.assign(this, { key, focus, states: graph.states });
+    this.viewport.size = measured(graph);
     this.drawing.setAttribute('aria-label', 'States of ' + graph.path);
-    this.viewport.size = graph.drawn ? measured(graph) : null;
-    if (!graph.drawn) return;
-    this.draw(graph);
-    this.viewport.place();
+    redraw(this.layer, this.view(robot + '/' + graph.path + '/', graph, machine));
+    this.map.set(graph, machine);
+    if (moves) whenLetGo(this.root, () => this.viewport.place());
   }
 
-  /** @param {server.Graph} graph */
-  draw(graph) {
-    /** @param {string} label */
-    const id = (label) => this.robot + '/' + graph.path + '/' + label;
-    if (graph.oracle) {
-      for (const line of oracleLines(graph)) this.addEdge(pairKey(line.from, line.to), line);
-      this.oracle = oracleShape(graph, id(graph.oracle));
-      this.layer.append(this.oracle);
-    }
-    for (const edge of graph.edges) {
-      const key = edgeKey(edge.from, edge.outcome, edge.to);
-      if (edge.points.length) this.addEdge(key, edgeShape(edge));
-    }
-    for (const { label, at } of graph.outcomes) {
-      const bundled = graph.bundled[label];
-      if (at) this.layer.append(outcomeShape(label, at, id(label), bundled || 0));
-    }
-    for (const { label, nested, at } of graph.states) {
-      if (!at) continue;
-      const open = nested ? () => this.onOpen(graph.path + '/' + label) : null;
-      const state = stateShape(label, at, id(label), open);
-      this.states.set(label, state);
-      this.layer.append(state.group);
-    }
-    this.map.set(graph);
+  /**
+   * @param {string} place with which the ids of its states begin
+   * @param {server.Graph} graph
+   * @param {machine.MachineState} machine
+   * @returns {page.Child[]}
+   */
+  view(place, graph, machine) {
+    const { path, oracle, states, outcomes, bundled } = graph;
+    const { shapes, viewport: { size: { rail } } } = this;
+    const active = activeIn(path, machine);
+    const failed = machine.failed[path]?.state;
+    const edges = graph.edges.filter(({ points }) => points.length);
+    const taken = takenEdges(machine.counts[path] || [], new Set(edges.map(edgeKey)));
+    /** @param {{ from: string, to: string }} edge */
+    const isHot = (edge) => isLatest(edge, machine.latest[path], oracle)
+      || (edge.to === oracle && edge.from === failed);
+    return [
+      oracleLines(graph).map((line) => {
+        const [key, hot] = [pairKey(line), isHot(line)];
+        return shapes.card(key, [taken.get(key), hot], () => (
+          oracleEdgeShape(line, rail, taken.get(key), hot, line.to === oracle)));
+      }),
+      oracle && oracleShape(graph, place + oracle, active.includes(oracle)),
+      edges.map((edge) => {
+        const [key, hot] = [edgeKey(edge), isHot(edge)];
+        return shapes.card(key, [taken.get(key), hot], () => edgeShape(edge, taken.get(key), hot));
+      }),
+      outcomes.map(({ label, at }) => (
+        at && outcomeShape(label, at, place + label, bundled[label] || 0))),
+      states.map(({ label, nested, at }) => {
+        if (!at) return null;
+        const kinds = [active.includes(label) ? 'active' : '', label === failed ? 'failed' : '',
+          label === this.found ? 'found' : ''];
+        const learned = machine.rates[path]?.[label];
+        const open = nested ? () => this.onOpen(path + '/' + label) : null;
+        return shapes.card(label, [learned, kinds], () => (
+          stateShape(label, at, place + label, open, learned, kinds)));
+      })];
   }
 
   /**
@@ -111,161 +113,54 @@ export class GraphView {
    * @param {string} label
    */
   find(label) {
-    for (const [each, { group }] of this.states) group.classList.toggle('found', each === label);
-    const state = this.states.get(label);
-    if (state) this.viewport.showMiddle(state.at);
+    this.found = label;
+    const at = this.states.find((each) => each.label === label)?.at;
+    if (at) this.viewport.showMiddle([at[0], at[1]]);
   }
 
-  /**
-   * @param {string} key
-   * @param {EdgeShape} edge
-   */
-  addEdge(key, edge) {
-    this.edges.set(key, edge);
-    this.layer.append(edge.group);
-  }
-
-  /**
-   * What is active, learned and counted.
-   * @param {machine.MachineState} machine
-   */
-  setState(machine) {
-    if (!this.graph || !this.graph.drawn) return;
-    const { path, oracle } = this.graph;
-    const active = activeIn(path, machine);
-    const failed = machine.failed[path]?.state || '';
-    const rates = machine.rates[path] || {};
-    for (const [label, state] of this.states) {
-      state.group.classList.toggle('active', active.includes(label));
-      state.group.classList.toggle('failed', label === failed);
-      showRate(state, label, rates[label]);
-    }
-    if (this.oracle) this.oracle.classList.toggle('active', active.includes(oracle));
-    this.map.mark(failed, active);
-    this.showCounts(machine.counts[path] || [], machine.latest[path], failed);
-    const focus = failed || active.find((label) => this.states.has(label)) || '';
-    const key = focus + ' ' + this.viewport.follow;
-    if (this.viewport.follow && key !== this.focusKey) {
-      this.focusKey = key;
-      whenLetGo(this.layer, () => this.viewport.place());
-    }
-  }
-
-  /**
-   * Where the failed state is, else an active one, else the first.
-   * @returns {[x: number, y: number]}
-   */
-  get focus() {
-    const states = [...this.states.values()];
-    /** @param {string} kind */
-    const first = (kind) => states.find((state) => state.group.classList.contains(kind));
-    const found = first('failed') || first('active') || states[0];
-    return found ? found.at : [0, 0];
-  }
-
-  /**
-   * @param {server.TransitionCount[]} counts
-   * @param {[from: string, to: string] | undefined} latest
-   * @param {string} failed
-   */
-  showCounts(counts, latest, failed) {
-    const taken = this.takenEdges(counts);
-    const oracle = this.graph ? this.graph.oracle : '';
-    const [latestFrom, latestTo] = latest || [undefined, undefined];
-    for (const [key, edge] of this.edges) {
-      const { from, to } = edge;
-      const hot = (latestFrom === from && latestTo === to) || (to === oracle && from === failed)
-        || (latestFrom === '' && from === oracle && to === latestTo);
-      showEdge(edge, taken.get(key), hot, to === oracle);
-    }
-  }
-
-  /**
-   * By the keys of edges.
-   * @param {server.TransitionCount[]} counts
-   */
-  takenEdges(counts) {
-    /** @type {Map<string, Taken>} */
-    const found = new Map();
-    for (const [from, outcome, to, number, share] of counts) {
-      const own = edgeKey(from, outcome, to);
-      const key = this.edges.has(own) ? own : pairKey(from, to);
-      const before = found.get(key) || { times: 0, share: 0 };
-      found.set(key, { times: before.times + number, share: before.share + share });
-    }
-    return found;
+  /** Where what failed or is active is, else the first state. */
+  get focusPlace() {
+    const shown = this.states.filter(({ at }) => at);
+    return (shown.find(({ label }) => label === this.focus) || shown[0])?.at || [0, 0];
   }
 }
 
+/** An element for each state and each edge of a drawing. */
+function newShapes() { return new Cards(() => svg('g', {})); }
+
 /**
- * @param {string} from
- * @param {string} outcome
- * @param {string} to
+ * Whether an edge is the transition that was made last.
+ * @param {{ from: string, to: string }} edge
+ * @param {server.LatestTransition | undefined} latest
+ * @param {string} oracle
  */
-function edgeKey(from, outcome, to) { return JSON.stringify([from, outcome, to]); }
+function isLatest({ from, to }, latest, oracle) {
+  return latest?.[1] === to && from === (latest[0] || oracle);
+}
+
+/**
+ * How often edges were taken, by their keys. Those that are not drawn are of ORACLE, or are not
+ * shown.
+ * @param {server.TransitionCount[]} counts
+ * @param {Set<string>} drawn keys
+ */
+function takenEdges(counts, drawn) {
+  /** @type {Map<string, Taken>} */
+  const found = new Map();
+  for (const [from, outcome, to, number, share] of counts) {
+    const own = edgeKey({ from, outcome, to });
+    const key = drawn.has(own) ? own : pairKey({ from, to });
+    const before = found.get(key) || { times: 0, share: 0 };
+    found.set(key, { times: before.times + number, share: before.share + share });
+  }
+  return found;
+}
+
+/** @param {{ from: string, outcome: string, to: string }} edge */
+function edgeKey({ from, outcome, to }) { return JSON.stringify([from, outcome, to]); }
 
 /**
  * Of an edge of ORACLE, which stands for all outcomes.
- * @param {string} from
- * @param {string} to
+ * @param {{ from: string, to: string }} edge
  */
-function pairKey(from, to) { return JSON.stringify([from, to]); }
-
-/**
- * @param {StateShape} state
- * @param {string} label
- * @param {machine.ShownRate | undefined} learned
- */
-function showRate({ group, rate, title }, label, learned) {
-  const known = Boolean(learned && learned.rate !== null);
-  group.classList.toggle('known', known);
-  if (!learned || learned.rate === null) return;
-  group.style.setProperty('--hue', String(hue(learned.rate)));
-  const { failures, successes } = learned;
-  const text = `failed ${failures}/${failures + successes} · est. ${percent(learned.rate)}`;
-  if (rate.textContent !== text) {
-    rate.textContent = text;
-    title.textContent = label + ': ' + text;
-  }
-}
-
-/**
- * @param {EdgeShape} edge
- * @param {Taken | undefined} taken
- * @param {boolean} hot it was taken last
- * @param {boolean} toOracle
- */
-function showEdge(edge, taken, hot, toOracle) {
-  const { group, line, label, from, to, ofOracle } = edge;
-  group.classList.toggle('used', Boolean(taken));
-  group.classList.toggle('hot', hot);
-  const arrow = !ofOracle || taken ? 'url(#arrow-' + arrowOf(edge, taken, hot) + ')' : '';
-  line.setAttribute('marker-end', arrow);
-  const text = edgeText(edge, taken, toOracle);
-  if (label.textContent === text) return;
-  label.textContent = text;
-  const title = taken ? [svg('title', {}, from + ' → ' + to + ', ' + times(taken.times))] : [];
-  group.replaceChildren(line, label, ...title);
-}
-
-/**
- * @param {EdgeShape} edge
- * @param {Taken | undefined} taken
- * @param {boolean} hot
- */
-function arrowOf({ ofOracle }, taken, hot) {
-  if (ofOracle) return hot ? 'failing' : 'oracle';
-  if (hot) return 'hot';
-  return taken ? 'used' : 'edge';
-}
-
-/**
- * @param {EdgeShape} edge
- * @param {Taken | undefined} taken
- * @param {boolean} toOracle
- */
-function edgeText({ ofOracle, outcome }, taken, toOracle) {
-  if (!ofOracle) return outcome + (taken ? ' ' + percent(taken.share) : '');
-  if (!taken) return '';
-  return taken.times + (toOracle ? '× failed' : '×');
-}
+function pairKey({ from, to }) { return JSON.stringify([from, to]); }

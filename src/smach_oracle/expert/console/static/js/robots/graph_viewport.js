@@ -17,8 +17,7 @@ export class GraphViewport {
   /** @param {import('./graph_view.js').GraphView} graph that it is the view of */
   constructor(graph) {
     this.graph = graph;
-    /** @type {Size | null} */
-    this.size = null;
+    this.size = { width: 1, height: 1, rail: 0 };
     this.view = { x: 0, y: 0, scale: 1 };
     this.follow = true;
     this.fitted = false;
@@ -46,25 +45,17 @@ export class GraphViewport {
   }
 
   place() {
-    const { box, size } = this;
-    if (!size || !box.width) return;
-    if (!this.follow) {
-      if (this.fitted) this.fit();
-      else this.apply();
-      return;
-    }
-    this.fit();
-    if (this.view.scale < SMALLEST_READABLE) this.showFocus(size, box);
+    if (!this.box.width) return;
+    if (this.follow || this.fitted) this.fit();
+    else this.apply();
+    if (this.follow && this.view.scale < SMALLEST_READABLE) this.showFocus();
   }
 
-  /**
-   * @param {Size} size
-   * @param {DOMRect} box
-   */
-  showFocus({ width, height }, box) {
+  showFocus() {
+    const { box, size: { width, height } } = this;
     const room = box.width - 2 * MARGIN;
     const scale = Math.max(SMALLEST_READABLE, Math.min(1, room / width));
-    const [x, y] = this.graph.focus;
+    const [x, y] = this.graph.focusPlace;
     const [seenWidth, seenHeight] = [box.width / scale, box.height / scale];
     this.view = { scale,
       x: width * scale > room ? x - seenWidth / 2 : (width - seenWidth) / 2,
@@ -73,9 +64,7 @@ export class GraphViewport {
   }
 
   fit() {
-    const { box, size } = this;
-    if (!size || !box.width) return;
-    const { width, height } = size;
+    const { box, size: { width, height } } = this;
     const scale = Math.min(LARGEST_FIT, (box.width - 2 * MARGIN) / width,
       (box.height - MARGIN - FOOT) / height);
     this.view = { scale, x: (width - box.width / scale) / 2,

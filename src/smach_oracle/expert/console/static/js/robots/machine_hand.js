@@ -14,41 +14,33 @@ import { byContainer, listed, machineOf, resumable, standingWords, waiting } fro
 const CANNOT_STOP = 'There is no connection: this page cannot stop it.';
 const REPLY_LASTS_MS = 20000; // it is of the past then
 const NEEDS_ROLE = 'To let it go on needs the role of an operator.';
-const NOTHING = { to: '', at: 0, ok: true, message: '' };
+const NOTHING = { of: '', to: '', at: 0, ok: true, message: '' };
 
 export class MachineHand {
-  /** @param {page.App} app */
-  constructor(app) {
+  /**
+   * @param {page.App} app
+   * @param {() => machine.Place} placeNow a container of the machine
+   */
+  constructor(app, placeNow) {
     this.app = app;
-    this.robot = '';
-    this.path = '';
-    this.replied = NOTHING; // to which command, and when (ms)
+    this.placeNow = placeNow;
+    this.replied = NOTHING; // of which machine, to which command, and when (ms)
     this.goOn = h('div', { class: 'row wrap go-on' });
     this.root = h('section', { hidden: true });
   }
+
+  get robot() { return this.placeNow().robot; }
 
   /**
    * How the machine stands; undefined where it cannot be held.
    * @returns {server.HeldMachine | undefined}
    */
   get machine() {
-    return machineOf(this.app.store.get(`live ${this.robot}`)?.control || [], this.path);
+    const { robot, path } = this.placeNow();
+    return machineOf(this.app.store.get(`live ${robot}`)?.control || [], path);
   }
 
-  /**
-   * @param {string} robot
-   * @param {string} path of a container
-   */
-  show(robot, path) {
-    const before = this.machine?.path;
-    const robotBefore = this.robot;
-    this.robot = robot;
-    this.path = path;
-    if (robot !== robotBefore || before !== this.machine?.path) this.replied = NOTHING;
-    this.update();
-  }
-
-  update() {
+  draw() {
     const { machine } = this;
     if (machine) {
       this.showGoOn(machine);
@@ -60,7 +52,7 @@ export class MachineHand {
   /** @param {server.HeldMachine} machine */
   view(machine) {
     const { path, paused } = machine;
-    const { ok, message } = this.replied;
+    const { ok, message } = this.replied.of === this.which ? this.replied : NOTHING;
     const held = paused || waiting(machine).length > 0;
     return h('section', { class: 'machine-hand' + (held ? ' held' : ''),
       'aria-label': 'Stop or hold the machine' },
@@ -82,6 +74,9 @@ export class MachineHand {
         (pattern, remove) => this.send('set_breakpoint', { path, pattern, remove })),
       h('span', { class: 'dim no-emergency-stop' }, NO_EMERGENCY_STOP)));
   }
+
+  /** The machine, among all. */
+  get which() { return this.robot + ' ' + this.machine?.path; }
 
   /**
    * Of a pause the line above says the same as soon as the robot tells it.
@@ -133,14 +128,14 @@ export class MachineHand {
    */
   async send(to, args) {
     this.replied = NOTHING;
-    this.update();
-    const { robot } = this;
+    this.draw();
+    const { robot, which } = this;
     const stops = to === 'stop_machine' || to === 'pause_machine';
     const { ok, message } = await this.app.connection.ask(to,
       /** @type {server.Commands[Name]} */ ({ robot, ...args }), stops ? CANNOT_STOP : '');
-    if (robot === this.robot) {
-      this.replied = { to, at: performance.now(), ok, message };
-      this.update();
+    if (which === this.which) {
+      this.replied = { of: which, to, at: performance.now(), ok, message };
+      this.draw();
     }
     return ok;
   }

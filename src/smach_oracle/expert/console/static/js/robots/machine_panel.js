@@ -26,8 +26,8 @@ class MachinePanel {
     this.picked = false; // by a person, or an address
     this.wanted = ''; // what an address names, until it is known
     this.source = machinesNow(app.store);
-    this.view = new MachineView(this.source, (path) => this.open(this.robot, path));
-    this.hand = new MachineHand(app);
+    this.view = new MachineView(this.source, () => this, (path) => this.open(this.robot, path));
+    this.hand = new MachineHand(app, () => this);
     this.picker = h('div', { class: 'picker', role: 'tree',
       'aria-label': 'Robots and their machines' });
     takeArrowKeys(this.picker);
@@ -69,8 +69,8 @@ class MachinePanel {
     this.down.draw();
     const groups = robots.map((robot) => this.pickerGroup(robot));
     redrawWith(this.picker, groups, () => groups.map((group) => this.pickerView(group)));
-    if (this.robot) this.view.show(this.robot, this.path);
-    this.hand.show(this.robot, this.path);
+    this.view.draw();
+    this.hand.draw();
     render(this.root, h('div', { class: 'panel machines' },
       robots.length ? [keep(this.picker), this.machineCard()]
         : h('p', { class: 'empty' }, NO_ROBOTS), keep(this.down.root)));

@@ -56,35 +56,23 @@ function machineState(store, robot) {
 export class MachineView {
   /**
    * @param {machine.MachineSource} source
+   * @param {() => machine.Place} placeNow which container is shown
    * @param {(path: string) => void} onOpen a nested container was chosen
    */
-  constructor(source, onOpen) {
+  constructor(source, placeNow, onOpen) {
     this.source = source;
+    this.placeNow = placeNow;
     this.graph = new GraphView(onOpen);
-    this.around = new AroundView(onOpen);
+    this.around = new AroundView(onOpen, () => this.draw());
     this.list = new StateList(onOpen);
-    this.search = new StateSearch(() => this.update(), (label) => this.find(label));
+    this.search = new StateSearch(() => this.draw(), (label) => this.find(label));
     this.root = h('div', {});
-    this.robot = '';
-    this.path = '';
   }
-
-  /**
-   * @param {string} robot
-   * @param {string} path
-   */
-  show(robot, path) {
-    this.robot = robot;
-    this.path = path;
-    this.update();
-  }
-
-  get data() { return this.source.graph(this.robot, this.path); }
 
   /** @param {Way} way */
   prefer(way) {
     remember(PREFERENCE, way);
-    this.update();
+    this.draw();
   }
 
   /** @param {string} label */
@@ -93,20 +81,15 @@ export class MachineView {
     this.around.choose(label);
   }
 
-  update() {
-    const { data, robot, search } = this;
+  draw() {
+    const { robot, path } = this.placeNow();
+    const data = this.source.graph(robot, path);
     const machine = this.source.state(robot);
     const shown = data ? wayOf(data) : '';
-    if (data) search.set(data);
+    if (data) this.search.set(data);
     render(this.root, h('div', { class: 'machine-view' }, data ? this.view(data, machine, shown)
       : h('p', { class: 'empty' }, UNKNOWN)));
-    if (data && shown === 'graph') {
-      this.graph.set(robot, data);
-      this.graph.setState(machine);
-    } else if (data && shown === 'around') this.around.set(robot, data, machine);
-    else if (data && shown === 'list') {
-      this.list.set(robot, data, machine, (label) => search.has(label));
-    }
+    if (data && shown) this[shown].set(robot, data, machine, (label) => this.search.has(label));
   }
 
   /**

@@ -18,6 +18,9 @@ export interface MachineState {
 
 export type ShownRate = Pick<LearnedRate, 'rate' | 'class' | 'successes' | 'failures'>;
 
+/** A container of a robot. */
+export interface Place { robot: string; path: string }
+
 /** Where a view of machines has them from: the robot now, or a trial at a moment. */
 export interface MachineSource {
   graph(robot: string, path: string): Graph | undefined;

@@ -4,7 +4,7 @@
 import { h } from '../page/dom.js';
 import { breakable } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
-import { arrange, redrawWith } from '../page/redraw.js';
+import { keep, redraw, redrawWith } from '../page/redraw.js';
 import { CameraView } from './camera_view.js';
 import { CloudView } from './cloud_view.js';
 import { JointsView } from './joints_view.js';
@@ -103,9 +103,9 @@ class SensorPanel {
   }
 
   showStage() {
-    const roots = [...this.views.values()].map((view) => view.root);
+    const roots = [...this.views.values()].map((view) => keep(view.root));
     const any = this.known.length > 0;
-    arrange(this.stage, roots.length ? roots : h('div', { class: 'empty' },
+    redraw(this.stage, roots.length ? roots : h('div', { class: 'empty' },
       h('h2', {}, any ? 'Nothing is looked at' : 'No sensors'),
       h('p', {}, any ? CHOOSE : NO_SENSORS)));
     this.stage.dataset['views'] = String(roots.length);

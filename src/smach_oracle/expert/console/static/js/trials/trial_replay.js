@@ -35,13 +35,15 @@ export class TrialReplay {
     this.index = -1; // of the event under the cursor
     this.shown = ''; // which one is shown
     this.chosen = ''; // path of a container
+    this.path = ''; // of the one that is shown
     /** @type {machine.MachineState} */
     this.state = { active: {}, latest: {}, failed: {}, rates: {}, counts: {}, paths: [] };
     this.timeline = new Timeline(this);
     this.controls = h('div', {});
     /** @type {machine.MachineSource} */
     const source = { graph: (_, path) => this.trial.graph(path), state: () => this.state };
-    this.view = new MachineView(source, (path) => this.open(path));
+    this.view = new MachineView(source, () => ({ robot: ROBOT, path: this.path }),
+      (path) => this.open(path));
     this.words = h('p', { class: 'replay-words', role: 'status' });
     this.question = new ReplayQuestion(app);
     this.lastSeconds = new FailureSeconds(app);
@@ -150,25 +152,24 @@ export class TrialReplay {
     this.lastSeconds.show(replays[now.failure]);
     const deepest = active.length ? active[active.length - 1][0] : event.path;
     const usual = graph(deepest) || !graph(event.path) ? deepest : event.path;
-    const shown = paths.includes(this.chosen) ? this.chosen : usual;
-    render(this.stage, this.stageView(active, now, paths, shown));
-    this.view.show(ROBOT, shown);
+    this.path = paths.includes(this.chosen) ? this.chosen : usual;
+    render(this.stage, this.stageView(active, now, paths));
+    this.view.draw();
   }
 
   /**
    * @param {[path: string, label: string][]} active
    * @param {replay.Snapshot} now
    * @param {string[]} paths of containers
-   * @param {string} shown
    */
-  stageView(active, { failed }, paths, shown) {
+  stageView(active, { failed }, paths) {
     return h('div', { class: 'replay-stage' }, h('div', { class: 'row replay-head' },
       h('div', { class: 'chips replay-path', 'aria-label': 'What is active' },
         active.map(([path, label], index) => [index > 0 && h('span', { class: 'dim' }, '›'),
           chip(label, failed[path] ? 'bad' : 'accent', path + '/' + label)]),
         !active.length && h('span', { class: 'dim' }, 'Nothing is active.')),
       h('span', { class: 'spacer' }),
-      pick({ class: 'replay-container', 'aria-label': 'Machine that is shown', title: shown,
+      pick({ class: 'replay-container', 'aria-label': 'Machine that is shown', title: this.path,
         hidden: paths.length < 2 }, ['', ...paths].map((path) => [path, path || FOLLOW]),
       this.chosen, (path) => this.open(path))),
     keep(this.view.root));
