@@ -6,13 +6,9 @@ import { h, pick } from '../page/dom.js';
 import { breakable } from '../page/format.js';
 import { remember, remembered } from '../page/preferences.js';
 import { redraw } from '../page/redraw.js';
-import { CameraView } from '../sensors/camera_view.js';
 import { robotOf } from '../sensors/robot_feed.js';
-import { RobotView } from '../sensors/robot_view.js';
+import { SensorViews } from '../sensors/sensor_views.js';
 
-/** @typedef {{ root: HTMLElement, stop(): void }} View */
-
-const WIDTH = 640; // px
 const MOST = 3; // at a time
 const PREFERENCE = 'drive views';
 const NONE = 'No camera of its own';
@@ -29,13 +25,11 @@ export class DriveViews {
     this.app = app;
     this.robot = robot;
     this.chosen = remembered(PREFERENCE, '').split('\n').filter(Boolean); // topics
-    /** @type {Map<string, View>} */
-    this.views = new Map(); // by topic
-    this.stage = h('div', { class: 'drive-stage' });
+    this.views = new SensorViews(app);
     this.root = h('div', { class: 'drive-views' });
   }
 
-  stop() { for (const view of this.views.values()) view.stop(); }
+  stop() { this.views.of([]); }
 
   /** The cameras that are known as the robot's own, the likeliest one first, and the robot. */
   get own() {
@@ -83,8 +77,7 @@ export class DriveViews {
           [topic, (topics.includes(topic) ? 'Close ' : '') + topic]))], '',
       (topic) => this.turn(topic))),
     h('p', { class: 'warn-note', hidden: !foreign.length }, NOT_ITS_OWN + foreign.join(', ')),
-    this.stage);
-    this.open(looked);
+    h('div', { class: 'drive-stage' }, this.views.of(looked)));
   }
 
   /**
@@ -95,22 +88,5 @@ export class DriveViews {
     return h('button', { key: topic, class: 'tool', 'data-view': topic, 'aria-pressed': isLookedAt,
       onclick: () => this.turn(topic) },
     kind === 'robot' ? IN_3D : breakable(topic.replace(/^\//, ''), '/'));
-  }
-
-  /** @param {server.Sensor[]} looked */
-  open(looked) {
-    for (const [topic, view] of this.views) {
-      if (looked.some((each) => each.topic === topic)) continue;
-      view.stop();
-      view.root.remove();
-      this.views.delete(topic);
-    }
-    for (const { kind, topic, type } of looked) {
-      if (this.views.has(topic)) continue;
-      const view = kind === 'robot' ? new RobotView(this.app, topic)
-        : new CameraView(this.app, topic, type, WIDTH);
-      this.views.set(topic, view);
-      this.stage.append(view.root);
-    }
   }
 }

@@ -318,7 +318,10 @@ export class QuestionDetail {
     this.showPerception();
     this.showInterface();
     if (changed('images', 'cameras')) this.camera.draw();
-    if (changed('replays')) this.lastSeconds.show(this.app.store.get('replays')?.[this.key]);
+    if (changed('replays')) { // what is shown stays where there is none any more
+      const { lastSeconds } = this;
+      lastSeconds.show(this.app.store.get('replays')?.[this.key] || lastSeconds.number);
+    }
     if (changed('questions')) redraw(this.way, visitsCard(this.now || this.question));
     if (changed('questions', `live ${robot}`) || names?.some((name) => name.startsWith('graph '))) {
       this.machine.draw();

@@ -94,14 +94,19 @@ export class LastSeconds {
   }
 
   /**
-   * Show a replay. What is shown stays where there is none any more.
+   * Show a replay, or none.
    * @param {number | undefined} number
    */
-  show(number) {
-    if (this.length) this.drawPlot(); // in the colours of now
-    if (!number || number === this.number) return;
+  show(number = 0) {
+    if (number === this.number) {
+      if (this.length) this.drawPlot(); // in the colours of now
+      return;
+    }
     this.number = number;
-    this.fetch();
+    this.length = 0; // what was shown is of something else
+    this.stop();
+    this.root.hidden = true;
+    if (number) this.fetch();
   }
 
   async fetch() {
@@ -253,13 +258,15 @@ export class LastSeconds {
     const { number } = this;
     for (let count = 0; count < most || !this.hasShown; count += 1) {
       const next = this.nextMissing();
-      if (next === null || number !== this.number) break;
+      if (next === null) break;
       const image = await this.fetchImage(number, next);
-      if (image === null) break; // the connection is away: whoever moves on asks again
+      // null: the connection is away, and whoever moves on asks again
+      if (image === null || number !== this.number) break;
       this.images.set(next, image);
       this.showImage();
     }
     this.loading = false;
+    if (number !== this.number) this.showImage(); // of another replay meanwhile
   }
 
   /** Whether the image of this moment is there. */

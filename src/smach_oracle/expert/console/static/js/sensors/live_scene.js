@@ -4,8 +4,9 @@ import { CloudLayer, unpacked } from '../drawing/cloud_layer.js';
 import { GridLayer } from '../drawing/grid_layer.js';
 import { SceneView } from '../drawing/scene_view.js';
 import { boxAround, vector } from '../drawing/transforms.js';
-import { h, replace, say, setText } from '../page/dom.js';
-import { RobotFeed } from './robot_feed.js';
+import { h, pick, say, setText } from '../page/dom.js';
+import { renderWith } from '../page/redraw.js';
+import { ROBOT, RobotFeed, robotOf } from './robot_feed.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
 
 const PERIOD_MS = 150;
@@ -13,19 +14,18 @@ const OFFER_MS = 1000; // how often it is looked for what else may be shown
 const NO_JOINTS = 'No joint states come.';
 const NEAR = 1.2; // m: what of a cloud is near a robot
 
-/** @abstract */
 export class LiveScene {
   /**
    * @param {page.App} app
    * @param {string} topic
-   * @param {string} choiceLabel
+   * @param {string} type
    */
-  constructor(app, topic, choiceLabel) {
+  constructor(app, topic, type) {
     this.app = app;
     this.topic = topic;
+    this.ofRobot = type === ROBOT; // a cloud may join it; else it is a cloud, which a robot may join
     this.scene = new SceneView(topic, () => this.home());
-    this.choice = h('select', { class: 'beside', 'aria-label': choiceLabel,
-      onchange: () => this.choose(this.choice.value) });
+    this.choice = h('select', {});
     this.count = h('span', { class: 'dim number' });
     this.lack = h('p', { class: 'view-lack dim', hidden: true });
     this.root = h('figure', { class: 'view cloud-view', 'data-topic': topic }, this.scene.root,
@@ -39,12 +39,11 @@ export class LiveScene {
     this.cloud = null;
     this.said = { cloud: '', robot: '' }; // what the feeds say
     /** @type {string | null} */
-    this.offered = null;
+    this.wanted = null; // the topic beside it that a person has chosen; null: nobody has
+    this.beside = ''; // the one that is shown
     this.shape = ''; // what is there
-    this.offering = 0;
-  }
-
-  begin() {
+    if (this.ofRobot) this.startRobot(topic);
+    else this.startClouds(topic, type);
     this.offer();
     this.offering = setInterval(() => this.offer(), OFFER_MS);
   }
@@ -52,40 +51,45 @@ export class LiveScene {
   stop() {
     clearInterval(this.offering);
     this.scene.stop();
-    for (const feed of [this.clouds, this.robot]) if (feed) feed.stop();
+    for (const feed of [this.clouds, this.robot]) feed?.stop();
   }
 
-  /** Offer what else there is to be shown. */
-  offer() { throw new Error('not a kind of scene'); }
+  /** Offer what else there is to be shown. A cloud has its robot beside it from the beginning. */
+  offer() {
+    const { app, ofRobot } = this;
+    const others = app.store.sensors.filter(({ kind }) => kind === (ofRobot ? 'cloud' : 'robot'));
+    const wanted = this.wanted ?? (ofRobot ? '' : robotOf(app, this.topic));
+    const found = others.find(({ topic }) => topic === wanted);
+    const beside = found?.topic || '';
+    renderWith(this.choice, [others, beside], () => this.choiceView(others, beside));
+    if (beside === this.beside) return;
+    this.beside = beside;
+    if (ofRobot) this.startClouds(beside, found?.type);
+    else this.startRobot(beside);
+  }
 
   /**
-   * What else is shown: a topic, or ''.
-   * @param {string} _topic
+   * @param {server.Sensor[]} others
+   * @param {string} beside
    */
-  choose(_topic) { throw new Error('not a kind of scene'); }
-
-  /**
-   * @param {string[]} topics
-   * @param {string} chosen
-   * @param {string} none says that nothing is chosen
-   * @param {(topic: string) => string} nameOf
-   */
-  offerTopics(topics, chosen, none, nameOf) {
-    const shape = topics.join('\n');
-    if (shape === this.offered) return;
-    this.offered = shape;
-    replace(this.choice, h('option', { value: '' }, none), topics.map((topic) => (
-      h('option', { value: topic, selected: topic === chosen }, nameOf(topic)))));
-    this.choice.hidden = !topics.length;
-    this.choose(this.choice.value);
+  choiceView(others, beside) {
+    const { ofRobot } = this;
+    return pick({ class: 'beside', hidden: !others.length,
+      'aria-label': ofRobot ? 'Point cloud in the view' : 'Robot in the view' },
+    [['', ofRobot ? 'no point cloud' : 'no robot'], ...others.map(({ topic }) => (
+      /** @type {[string, string]} */ ([topic, ofRobot ? 'with ' + topic.replace(/^\//, '')
+        : 'with robot ' + topic.slice(1, -ROBOT.length - 1)])))], beside, (topic) => {
+      this.wanted = topic;
+      this.offer();
+    });
   }
 
   /** @param {string} topic '' for none */
   startRobot(topic) {
-    if (this.robot) this.robot.stop();
+    this.robot?.stop();
     this.robot = topic ? new RobotFeed(this.app, topic, this.root, { moved: () => this.changed(),
-      say: (text, missing) => this.sayOfRobot(missing ? NO_JOINTS : text) }) : null;
-    this.sayOfRobot('');
+      say: (text, missing) => this.say('robot', missing ? NO_JOINTS : text) }) : null;
+    this.say('robot', '');
     this.changed();
   }
 
@@ -94,16 +98,17 @@ export class LiveScene {
    * @param {string} [type]
    */
   startClouds(topic, type) {
-    if (this.clouds) this.clouds.stop();
+    this.clouds?.stop();
     this.cloud = null;
+    setText(this.count, '');
     const which = () => numberOf(this.app, topic, type);
     this.clouds = topic ? new SensorFeed(this.app, which, this.root, {
       every: PERIOD_MS,
-      beside: () => (this.robot ? this.robot.number : undefined),
+      beside: () => this.robot?.number,
       take: (answer, facts) => this.takeCloud(answer, facts),
-      say: (text) => this.sayOfCloud(text),
+      say: (text) => this.say('cloud', text),
     }) : null;
-    this.sayOfCloud(topic ? 'Waiting for the first cloud…' : '');
+    this.say('cloud', topic ? 'Waiting for the first cloud…' : '');
     this.changed();
   }
 
@@ -152,15 +157,12 @@ export class LiveScene {
     }
   }
 
-  /** @param {string} text */
-  sayOfCloud(text) {
-    this.said.cloud = text;
-    this.showLack();
-  }
-
-  /** @param {string} text */
-  sayOfRobot(text) {
-    this.said.robot = text;
+  /**
+   * @param {'cloud' | 'robot'} which feed says it
+   * @param {string} text
+   */
+  say(which, text) {
+    this.said[which] = text;
     this.showLack();
   }
 

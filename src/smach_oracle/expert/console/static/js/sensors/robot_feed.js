@@ -11,21 +11,14 @@ export const ROBOT = 'robot_description';
 const PERIOD_MS = 120;
 
 /**
- * The robots that are known.
- * @param {page.App} app
- */
-export function robotsOf(app) {
-  return app.store.sensors.filter((each) => each.kind === 'robot').map((each) => each.topic);
-}
-
-/**
  * The robot that a topic belongs to: it has its namespace. '' where there is none.
  * @param {page.App} app
  * @param {string} topic
  */
-export function robotOf(app, topic) {
-  const found = robotsOf(app).filter((robot) => topic.startsWith(robot.slice(0, -ROBOT.length)));
-  return found.sort((one, other) => other.length - one.length)[0] || '';
+export function robotOf({ store }, topic) {
+  const found = store.sensors.filter((each) => (
+    each.kind === 'robot' && topic.startsWith(each.topic.slice(0, -ROBOT.length))));
+  return found.sort((one, other) => other.topic.length - one.topic.length)[0]?.topic || '';
 }
 
 export class RobotFeed {

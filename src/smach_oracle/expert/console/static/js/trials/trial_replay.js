@@ -5,9 +5,9 @@ import { h, modified, pick, setText, typing } from '../page/dom.js';
 import { added, chip } from '../page/format.js';
 import { keep, render } from '../page/redraw.js';
 import { MachineView } from '../robots/machine_view.js';
+import { LastSeconds } from '../sensors/last_seconds.js';
 import { MachineHistory, activePath, machineStateOf } from './machine_history.js';
 import { replayControls } from './replay_controls.js';
-import { FailureSeconds } from './failure_seconds.js';
 import { ReplayQuestion } from './replay_question.js';
 import { Timeline } from './timeline.js';
 
@@ -46,7 +46,7 @@ export class TrialReplay {
       (path) => this.open(path));
     this.words = h('p', { class: 'replay-words', role: 'status' });
     this.question = new ReplayQuestion(app);
-    this.lastSeconds = new FailureSeconds(app);
+    this.lastSeconds = new LastSeconds(app);
     this.stage = h('div', {});
     this.root = h('div', { class: 'replay', onkeydown: (event) => this.keyOutside(event) },
       this.controls, this.timeline.root, this.words, this.question.root, this.stage);
