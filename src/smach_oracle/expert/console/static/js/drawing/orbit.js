@@ -1,6 +1,7 @@
 // @ts-check
 // Looking at something from all sides: one finger or the left button turns, two or the right one
 // move, the wheel or a pinch zooms; arrow keys turn, + and - zoom.
+import { Gestures } from '../page/gestures.js';
 import { vector } from './transforms.js';
 
 const FOCAL = 1.1; // of the height
@@ -8,8 +9,6 @@ const FURTHEST = 200; // m
 const CLOSEST = 0.05;
 const STEEPEST = 1.55; // rad
 const TURN = 0.008; // rad for 1 px
-/** @type {{ [key: string]: [number, number] | undefined }} */
-const STEPS = { ArrowLeft: [-12, 0], ArrowRight: [12, 0], ArrowUp: [0, -12], ArrowDown: [0, 12] };
 
 export class Orbit {
   /**
@@ -25,15 +24,9 @@ export class Orbit {
     this.azimuth = -0.5;
     this.elevation = 0.45;
     this.optical = false;
-    /** @type {Map<number, PointerEvent>} */
-    this.pointers = new Map();
-    const active = { passive: false };
-    canvas.addEventListener('pointerdown', (event) => this.down(event), active);
-    canvas.addEventListener('pointermove', (event) => this.move(event), active);
-    canvas.addEventListener('pointerup', (event) => this.up(event), active);
-    canvas.addEventListener('pointercancel', (event) => this.up(event), active);
-    canvas.addEventListener('wheel', (event) => this.wheel(event), active);
-    canvas.addEventListener('keydown', (event) => this.key(event), active);
+    this.gestures = new Gestures(canvas, { step: 12, closer: 1.18, wheel: 0.0012, end: changed,
+      drag: (dx, dy, other) => (other ? this.shift(dx, dy) : this.turn(dx, dy)),
+      zoom: (factor) => this.zoom(factor) });
     canvas.addEventListener('contextmenu', (event) => event.preventDefault());
   }
 
@@ -101,55 +94,13 @@ export class Orbit {
     this.changed();
   }
 
-  /** @param {number} factor of the distance */
+  /** @param {number} factor above 1: closer */
   zoom(factor) {
-    this.distance = bounded(CLOSEST, this.distance * factor, FURTHEST);
+    this.distance = bounded(CLOSEST, this.distance / factor, FURTHEST);
     this.changed();
   }
 
-  /** @param {PointerEvent} event */
-  down(event) {
-    this.canvas.setPointerCapture(event.pointerId);
-    this.pointers.set(event.pointerId, event);
-  }
-
-  /** @param {PointerEvent} event */
-  move(event) {
-    const before = this.pointers.get(event.pointerId);
-    if (!before) return;
-    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-    const other = [...this.pointers.values()].find((each) => each.pointerId !== event.pointerId);
-    this.pointers.set(event.pointerId, event);
-    if (other) {
-      this.zoom(span(before, other) / span(event, other));
-      this.shift(dx / 2, dy / 2);
-    } else if (event.buttons & 6 || event.shiftKey) this.shift(dx, dy);
-    else this.turn(dx, dy);
-  }
-
-  /** @param {PointerEvent} event */
-  up(event) {
-    this.pointers.delete(event.pointerId);
-    this.changed();
-  }
-
-  get moving() { return this.pointers.size > 0; }
-
-  /** @param {WheelEvent} event */
-  wheel(event) {
-    event.preventDefault();
-    this.zoom(Math.exp(event.deltaY * 0.0012));
-  }
-
-  /** @param {KeyboardEvent} event */
-  key(event) {
-    const step = STEPS[event.key];
-    if (!step && !'+-'.includes(event.key)) return;
-    event.preventDefault();
-    event.stopPropagation();
-    if (step) this.turn(...step);
-    else this.zoom(event.key === '+' ? 0.85 : 1.18);
-  }
+  get moving() { return this.gestures.pressed; }
 }
 
 /**
@@ -158,12 +109,3 @@ export class Orbit {
  * @param {number} most
  */
 function bounded(least, value, most) { return Math.min(most, Math.max(least, value)); }
-
-/**
- * px between two fingers.
- * @param {PointerEvent} one
- * @param {PointerEvent} other
- */
-function span(one, other) {
-  return Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY) || 1;
-}

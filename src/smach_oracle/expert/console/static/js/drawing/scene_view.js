@@ -1,6 +1,6 @@
 // @ts-check
 // A scene in 3D to be turned round: layers on a canvas.
-import { h, say } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
 import { Orbit } from './orbit.js';
 import { Raster } from './raster.js';
 import { boxAround, diagonalOf, middleOf } from './transforms.js';
@@ -37,7 +37,7 @@ export class SceneView {
 
   /** @param {string} text */
   say(text) {
-    say(this.note, text);
+    setText(this.note, text);
   }
 
   /** @param {(drawing.Layer | null | undefined | false)[]} layers */

@@ -1,8 +1,7 @@
 // @ts-check
 // Marking by keyboard: the arrow keys move a cross over the image, Enter or Space begins and ends
 // what is drawn, Escape takes the line back.
-import { announce } from '../page/announce.js';
-import { modified } from '../page/dom.js';
+import { announce, modified } from '../page/dom.js';
 
 /** @typedef {import('./marking_canvas.js').MarkingCanvas} MarkingCanvas */
 

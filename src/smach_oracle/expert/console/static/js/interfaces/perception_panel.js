@@ -1,7 +1,7 @@
 // @ts-check
 // Marking an object in the very image of the failure: draw around it, refine, accept; the machine
 // goes on.
-import { h, say, setText } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
 import { keep, render } from '../page/redraw.js';
 import { drawImage } from '../sensors/image_canvas.js';
 import { SensorFeed } from '../sensors/sensor_feed.js';
@@ -135,7 +135,7 @@ export class PerceptionPanel {
    */
   say(text, missing) {
     if (missing === 'next') return; // one image is all there is to come
-    say(this.note, this.stamp ? '' : text);
+    setText(this.note, this.stamp ? '' : text);
   }
 
   /**

@@ -1,8 +1,7 @@
 // @ts-check
 // What calls a person who looks elsewhere, or does not see: the title, a sound, a notification, a
 // live region.
-import { announce } from './announce.js';
-import { h, setText } from './dom.js';
+import { announce, h, setText } from './dom.js';
 import { counted } from './format.js';
 import { remember, remembered } from './preferences.js';
 

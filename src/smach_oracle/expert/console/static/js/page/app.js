@@ -192,7 +192,6 @@ export class App {
   /** @param {State} state */
   onState(state) {
     if (state === 'connected') this.liveness.begin();
-    this.connection.state = state;
     this.showLife();
     this.showPerson();
     this.person.hidden = state === 'signed-out';

@@ -57,10 +57,8 @@ export class Connection {
     this.wantedExpert = ''; // the name that the person has chosen
     this.expert = ''; // the one under which the server knows this page
     this.browser = ''; // under which claims of this browser are known
-    this.connected = false;
     /** @type {State} */
     this.state = 'connecting';
-    this.signedOut = false;
     this.leaving = false;
     const hurry = () => this.hurry();
     window.addEventListener('online', hurry);
@@ -68,19 +66,26 @@ export class Connection {
     document.addEventListener('visibilitychange', hurry);
   }
 
+  get connected() { return this.state === 'connected'; }
+
+  /** @param {State} state */
+  turn(state) {
+    this.state = state;
+    this.onState(state);
+  }
+
   /** Signed out: another page of this browser may have signed in meanwhile. */
   hurry() {
-    const waits = Boolean(this.timer) || this.signedOut;
-    if (!this.connected && !document.hidden && waits) this.connect();
+    const waits = this.state === 'lost' || this.state === 'signed-out';
+    if (waits && !document.hidden) this.connect();
   }
 
   async connect() {
     clearTimeout(this.timer);
-    this.timer = 0;
     const generation = ++this.generation;
     this.fail();
-    if (this.socket) this.socket.close();
-    this.onState('connecting');
+    this.socket?.close();
+    this.turn('connecting');
     try {
       const session = await this.whoAmI();
       if (generation !== this.generation) return;
@@ -89,26 +94,20 @@ export class Connection {
       if (generation === this.generation) this.retryLater();
       return;
     }
-    this.signedOut = !this.session.signed_in;
-    if (this.signedOut) this.onState('signed-out');
-    else this.open(generation, this.session);
+    if (this.session.signed_in) this.open(generation);
+    else this.turn('signed-out');
   }
 
   /** @returns {Promise<server.Session>} */
   async whoAmI() {
-    const limit = new AbortController();
-    const timer = setTimeout(() => limit.abort(), SESSION_LIMIT_MS);
-    const answer = await fetch('session', { cache: 'no-store', signal: limit.signal });
-    clearTimeout(timer);
+    const signal = AbortSignal.timeout(SESSION_LIMIT_MS);
+    const answer = await fetch('session', { cache: 'no-store', signal });
     if (!answer.ok) throw new ConnectionLost();
     return answer.json();
   }
 
-  /**
-   * @param {number} generation
-   * @param {server.Session} session
-   */
-  open(generation, session) {
+  /** @param {number} generation */
+  open(generation) {
     const address = new URL('socket', location.href);
     address.protocol = address.protocol.replace('http', 'ws');
     const socket = this.socket = new WebSocket(address);
@@ -119,31 +118,25 @@ export class Connection {
       this.fail();
       this.retryLater();
     };
-    socket.onopen = () => this.sayHello(generation, session);
+    socket.onopen = () => this.sayHello(generation);
   }
 
-  /**
-   * @param {number} generation
-   * @param {server.Session} session
-   */
-  async sayHello(generation, { xsrf }) {
+  /** @param {number} generation */
+  async sayHello(generation) {
     try {
-      const reply = await this.hello(xsrf);
+      const reply = await this.hello();
       if (!reply.ok || generation !== this.generation) return;
       this.pause = SHORTEST_PAUSE_S;
-      this.connected = true;
-      this.onState('connected');
+      this.turn('connected');
     } catch (err) {
       unlessLost(err);
     }
   }
 
-  /**
-   * Say who uses this page: at first, and once a name is given.
-   * @param {string} xsrf
-   */
-  async hello(xsrf) {
-    const reply = await this.request('hello', { xsrf, expert: this.wantedExpert });
+  /** Say who uses this page: at first, and once a name is given. */
+  async hello() {
+    const { xsrf, wantedExpert: expert } = this;
+    const reply = await this.request('hello', { xsrf, expert });
     if (reply.ok) {
       this.expert = reply.message;
       this.browser = reply.data?.browser || '';
@@ -152,15 +145,13 @@ export class Connection {
   }
 
   retryLater() {
-    this.connected = false;
-    this.onState('lost');
+    this.turn('lost');
     this.timer = setTimeout(() => this.connect(), this.pause * 1000);
     this.pause = Math.min(LONGEST_PAUSE_S, this.pause * 1.7);
   }
 
   /** Nothing that is asked for will be answered. */
   fail() {
-    this.connected = false;
     const lost = new ConnectionLost('the connection was lost');
     for (const number of [...this.waiting.keys()]) this.settle(number)?.reject(lost);
   }
@@ -292,10 +283,8 @@ export class Connection {
     const answer = await ask();
     if (answer.status !== 403 && answer.status !== 401) return answer;
     if (this.xsrf === xsrf) this.session = await this.whoAmI(); // else it is another one already
-    if (!this.session?.signed_in && this.connected && !this.leaving) {
-      this.fail();
-      this.connect(); // which asks for the token
-    }
+    // which asks for the token
+    if (!this.session?.signed_in && this.connected && !this.leaving) this.connect();
     return this.xsrf === xsrf ? answer : ask();
   }
 

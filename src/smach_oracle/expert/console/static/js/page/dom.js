@@ -3,6 +3,7 @@
 
 const SVG = 'http://www.w3.org/2000/svg';
 const TOAST_MS = 6000;
+const MOST_KEPT = 3; // texts that are announced; the oldest go
 // what steers a terminal, turns the reading direction, or cannot be seen
 const UNSEEN = new RegExp('[\\u0000-\\u0008\\u000b-\\u001f\\u007f-\\u009f\\u00ad\\u200b-\\u200f'
   + '\\u2028-\\u202e\\u2060-\\u206f\\ufeff\\ufff9-\\ufffb]', 'g');
@@ -148,16 +149,6 @@ export function setText(element, text) {
 }
 
 /**
- * Put words into an element, which is there only where there are some.
- * @param {HTMLElement} element
- * @param {string} words
- */
-export function say(element, words) {
-  element.hidden = !words;
-  setText(element, words);
-}
-
-/**
  * An element of index.html.
  * @param {string} id
  */
@@ -178,6 +169,17 @@ export function toast(text, kind) {
   shown.addEventListener('click', () => shown.remove());
   toasts.append(shown);
   setTimeout(() => shown.remove(), TOAST_MS);
+}
+
+/**
+ * Say something to those who hear the page instead of looking at it, once what is being said has
+ * ended.
+ * @param {string} text
+ */
+export function announce(text) {
+  const region = part('announcer');
+  region.append(h('p', {}, text)); // a new element is said, too, where its text is an old one
+  while (region.childElementCount > MOST_KEPT) region.firstElementChild?.remove();
 }
 
 /**

@@ -90,7 +90,7 @@ function showDemand(connection, done) {
     event.preventDefault();
     if (!name.value.trim()) return;
     connection.wantedExpert = name.value.trim();
-    const reply = await connection.hello(connection.xsrf).catch(() => null);
+    const reply = await connection.hello().catch(() => null);
     given = Boolean(reply && reply.ok && reply.message);
     if (given) remember('expert', connection.wantedExpert);
     if (given) dialog.close();
@@ -123,6 +123,5 @@ function rename(connection, name) {
   if (!name || name === connection.expert) return;
   connection.wantedExpert = name;
   remember('expert', name);
-  connection.fail();
   connection.connect();
 }

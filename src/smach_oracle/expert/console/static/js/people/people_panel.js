@@ -1,8 +1,8 @@
 // @ts-check
 // Who did what and when, how long it took, and the notes for the next shift.
-import { h, setText } from '../page/dom.js';
+import { h } from '../page/dom.js';
 import { clock, duration } from '../page/format.js';
-import { redraw, redrawWith } from '../page/redraw.js';
+import { keep, redrawWith, render } from '../page/redraw.js';
 
 /** @type {page.Panel} */
 export const people = { id: 'people', title: 'People', create: (app) => new PeoplePanel(app) };
@@ -18,35 +18,38 @@ class PeoplePanel {
     this.app = app;
     this.text = h('textarea', { rows: 3, maxlength: 2000, 'aria-label': 'A note for the next shift',
       placeholder: 'What the next shift must know' });
-    this.leave = h('button', { class: 'primary', type: 'submit' }, 'Leave the note');
-    this.problem = h('p', { class: 'problem', role: 'alert' });
-    this.notes = h('div', { class: 'notes' });
-    this.shifts = h('section', { class: 'card', 'aria-label': 'Shifts' });
+    this.problem = ''; // with the last note
     this.search = h('input', { type: 'search', placeholder: 'Search', 'aria-label': 'Search acts',
       oninput: () => this.showActs() });
     this.acts = h('tbody', {});
-    this.root = h('div', { class: 'panel people' },
-      h('section', { class: 'card' }, h('h2', {}, 'For the next shift'),
-        h('form', { class: 'note-form', onsubmit: (event) => this.write(event) }, this.text,
-          this.problem, h('div', { class: 'row' }, this.leave)), this.notes),
-      this.shifts,
-      h('section', { class: 'card acts' }, h('h2', {}, 'Who did what'), this.search,
-        h('div', { class: 'table-frame', tabindex: 0 }, h('table', {}, h('thead', {}, h('tr', {},
-          ['When', 'Who', 'What', 'Robot', 'Result'].map((title) => (
-            h('th', { scope: 'col' }, title))))), this.acts))));
+    this.root = h('div', {});
   }
 
   get sections() { return /^(?:people|acts)$/; }
 
   draw() {
-    const found = this.app.store.get('people');
-    if (found) {
-      const { app } = this;
-      redraw(this.notes, notesOf(found, app.mayAnswer, (note) => this.send('drop_note', { note })));
-      redraw(this.shifts, h('h2', {}, 'Shifts'), shiftsOf(found));
-      this.leave.disabled = this.text.disabled = !app.mayAnswer;
-    }
+    this.text.disabled = !this.app.mayAnswer;
+    render(this.root, this.view(this.app.store.get('people')));
     this.showActs();
+  }
+
+  /** @param {server.People | undefined} found */
+  view(found) {
+    const { mayAnswer } = this.app;
+    return h('div', { class: 'panel people' },
+      h('section', { class: 'card' }, h('h2', {}, 'For the next shift'),
+        h('form', { class: 'note-form', onsubmit: (event) => this.write(event) }, keep(this.text),
+          h('p', { class: 'problem', role: 'alert' }, this.problem), h('div', { class: 'row' },
+            h('button', { class: 'primary', type: 'submit', disabled: !mayAnswer },
+              'Leave the note'))),
+        h('div', { class: 'notes' }, found
+          && notesOf(found, mayAnswer, (note) => this.send('drop_note', { note })))),
+      h('section', { class: 'card', 'aria-label': 'Shifts' }, h('h2', {}, 'Shifts'),
+        found && shiftsOf(found)),
+      h('section', { class: 'card acts' }, h('h2', {}, 'Who did what'), keep(this.search),
+        h('div', { class: 'table-frame', tabindex: 0 }, h('table', {}, h('thead', {}, h('tr', {},
+          ['When', 'Who', 'What', 'Robot', 'Result'].map((title) => (
+            h('th', { scope: 'col' }, title))))), keep(this.acts)))));
   }
 
   showActs() {
@@ -72,7 +75,8 @@ class PeoplePanel {
    */
   async send(name, args) {
     const { ok, message } = await this.app.connection.ask(name, args, LOST);
-    setText(this.problem, ok ? '' : message);
+    this.problem = ok ? '' : message;
+    this.draw();
     return ok;
   }
 }

@@ -56,8 +56,8 @@ export class QuestionDetail {
     this.camera = new SituationCamera(app, question);
     this.lastSeconds = new LastSeconds(app);
     this.way = h('div', {}, visitsCard(question));
-    this.perceptionPlace = h('div', { class: 'workbench', hidden: true });
-    this.interfacePlace = h('div', { class: 'workbench', hidden: true });
+    this.perceptionPlace = h('div', { class: 'workbench' });
+    this.interfacePlace = h('div', { class: 'workbench' });
     /** @type {string | null} */
     this.robotGone = null; // how it went, and the question with it; null: it was open until now
     this.form = new AnswerForm(question, (answer) => this.answer(answer),
@@ -251,7 +251,6 @@ export class QuestionDetail {
       this.perceptionPanel = null;
       replace(this.perceptionPlace);
     }
-    this.perceptionPlace.hidden = !this.perceptionPanel;
   }
 
   /** Show what the robot does after an interface that somebody else may have started. */
@@ -290,7 +289,6 @@ export class QuestionDetail {
       replace(this.interfacePlace, this.interfacePanel.root);
       this.interfaceSeen = false;
     }
-    this.interfacePlace.hidden = !this.interfacePanel;
     if (this.interfacePanel && this.interfacePanel.manipulation && !this.interfaceSeen) {
       this.interfaceSeen = true;
       this.interfacePlace.scrollIntoView({ block: 'start' }); // it comes in above what was pressed

@@ -8,20 +8,7 @@ import { isOracle, listed, resumable, running, waiting } from './hand_words.js';
 /** @typedef {{ state: string, path: string, rate: number | null }} ActivePlace */
 /** @typedef {Pick<server.Question, 'key' | 'state' | 'stands' | 'asked' | 'rate' | 'holder'
  *   | 'interface'>} Asked what a card says of a question: few words, which are compared quickly */
-/**
- * @typedef {object} RobotFacts
- * @property {string} robot
- * @property {Standing} standing
- * @property {string} why what makes it stand so, for a title
- * @property {Asked | undefined} question the one that has waited longest
- * @property {number} questions
- * @property {ActivePlace[]} active
- * @property {string} path of its first machine
- * @property {boolean} holdable
- * @property {server.HeldMachine[]} paused
- * @property {server.RobotHealth | undefined} health
- * @property {{ words: string, at: number } | null} last
- */
+/** @typedef {ReturnType<typeof factsOf>} RobotFacts */
 
 const BY_NAME = new Intl.Collator('en', { numeric: true }); // robot_2 before robot_10
 /** @type {Standing[]} by how much a person is needed */
@@ -60,9 +47,9 @@ export function robotsOf({ store }) {
 }
 
 /**
+ * What its card says of a robot.
  * @param {page.App} app
  * @param {string} robot
- * @returns {RobotFacts}
  */
 export function factsOf(app, robot) {
   const { store } = app;
@@ -72,9 +59,13 @@ export function factsOf(app, robot) {
   const machines = live?.control || [];
   const { standing, why } = standingOf(app, robot, asked, waits);
   const [first] = [...waits, ...asked];
-  return { robot, standing, why, question: first && shortened(first), questions: asked.length,
+  return { robot, standing,
+    why, // what makes it stand so, for a title
+    question: first && shortened(first), // the one that has waited longest
+    questions: asked.length,
     active: live && live.alive ? placesOf(live).filter((each) => !isOracle(each, robot, store))
-      : [], path: live?.paths[0] || '',
+      : [],
+    path: live?.paths[0] || '', // of its first machine
     holdable: Boolean(live?.control), paused: machines.filter(({ paused }) => paused),
     health: store.get('health')?.[robot], last: live?.last || null };
 }

@@ -8,13 +8,10 @@ import {
   stateShape,
 } from './graph_shapes.js';
 import { activeIn, focusState } from './focus_state.js';
-import { takeGraphKeys } from './graph_keys.js';
 import { GraphMap } from './graph_map.js';
-import { GraphViewport } from './graph_viewport.js';
+import { CLOSER, GraphViewport } from './graph_viewport.js';
 
 /** @typedef {import('./graph_shapes.js').Taken} Taken */
-
-const CLOSER = 1.3;
 
 export class GraphView {
   /** @param {(path: string) => void} onOpen a nested container was chosen */
@@ -36,7 +33,6 @@ export class GraphView {
     /** @type {GraphViewport} */
     this.viewport = new GraphViewport(this);
     this.viewport.setFollow(true);
-    takeGraphKeys(this.drawing, this.viewport);
   }
 
   tools() {

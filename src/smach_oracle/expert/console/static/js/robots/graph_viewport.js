@@ -1,11 +1,13 @@
 // @ts-check
 // Which part of a drawing is seen: all of it where that stays readable, else what is active; or
-// what a person has moved into view, by mouse, wheel or fingers.
+// what a person has moved into view, by mouse, wheel, fingers or keys.
+import { Gestures } from '../page/gestures.js';
 
 /** @typedef {{ width: number, height: number }} Size px */
 /** @typedef {[x: number, y: number]} Place px */
 /** @typedef {{ x: number, y: number, width: number, height: number }} Seen px of the drawing */
 
+export const CLOSER = 1.3;
 const MARGIN = 24; // px
 const FOOT = 52; // px below the drawing, where the buttons are
 const SMALLEST_READABLE = 0.55;
@@ -21,10 +23,9 @@ export class GraphViewport {
     this.view = { x: 0, y: 0, scale: 1 };
     this.follow = true;
     this.fitted = false;
-    /** @type {Map<number, PointerEvent>} */
-    this.pointers = new Map();
-    this.spread = 0; // px between two fingers
-    this.listen();
+    new Gestures(graph.drawing, { step: -60, closer: CLOSER, wheel: 1 / 400,
+      drag: (dx, dy) => this.shift(dx, dy),
+      zoom: (factor, at) => this.zoom(factor, at) });
     new ResizeObserver(() => this.place()).observe(graph.root);
   }
 
@@ -94,11 +95,11 @@ export class GraphViewport {
 
   /**
    * @param {number} factor
-   * @param {Place} [at] px in the frame: what stays there; else its middle
+   * @param {Place} [at] px of the window: what stays there; else the middle
    */
   zoom(factor, at) {
     const { box, view } = this;
-    const [px, py] = at || [box.width / 2, box.height / 2];
+    const [px, py] = at ? [at[0] - box.left, at[1] - box.top] : [box.width / 2, box.height / 2];
     const scale = Math.min(LARGEST, Math.max(SMALLEST, view.scale * factor));
     this.leave();
     this.view = { scale, x: this.view.x + px / this.view.scale - px / scale,
@@ -112,56 +113,6 @@ export class GraphViewport {
     this.fitted = false;
   }
 
-  listen() {
-    const { graph: { drawing }, pointers } = this;
-    drawing.addEventListener('wheel', (event) => {
-      event.preventDefault();
-      this.zoom(Math.exp(-event.deltaY / 400), this.inFrame(event.clientX, event.clientY));
-    }, { passive: false });
-    drawing.addEventListener('pointerdown', (event) => {
-      if (!pointers.size) this.listenWhilePressed();
-      pointers.set(event.pointerId, event);
-      this.spread = 0;
-    });
-  }
-
-  /** To the window, and no longer: it would keep every drawing that there ever was. */
-  listenWhilePressed() {
-    const off = new AbortController();
-    const { signal } = off;
-    window.addEventListener('pointermove', (event) => this.move(event), { signal });
-    /** @param {PointerEvent} event */
-    const end = (event) => {
-      this.pointers.delete(event.pointerId);
-      this.spread = 0;
-      if (!this.pointers.size) off.abort();
-    };
-    window.addEventListener('pointerup', end, { signal });
-    window.addEventListener('pointercancel', end, { signal });
-  }
-
-  /**
-   * px in the frame.
-   * @param {number} x
-   * @param {number} y
-   * @returns {Place}
-   */
-  inFrame(x, y) {
-    const { box } = this;
-    return [x - box.left, y - box.top];
-  }
-
-  /** @param {PointerEvent} event */
-  move(event) {
-    const before = this.pointers.get(event.pointerId);
-    if (!before) return;
-    this.pointers.set(event.pointerId, event);
-    const fingers = [...this.pointers.values()];
-    const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-    if (fingers.length === 1) this.shift(dx, dy);
-    else if (fingers.length === 2) this.pinch(fingers[0], fingers[1]);
-  }
-
   /**
    * @param {number} dx px
    * @param {number} dy px
@@ -172,16 +123,5 @@ export class GraphViewport {
     this.view.x -= dx / this.view.scale;
     this.view.y -= dy / this.view.scale;
     this.apply();
-  }
-
-  /**
-   * @param {PointerEvent} one
-   * @param {PointerEvent} other
-   */
-  pinch(one, other) {
-    const spread = Math.hypot(one.clientX - other.clientX, one.clientY - other.clientY);
-    const [x, y] = [(one.clientX + other.clientX) / 2, (one.clientY + other.clientY) / 2];
-    if (this.spread) this.zoom(spread / this.spread, this.inFrame(x, y));
-    this.spread = spread;
   }
 }

@@ -1,19 +1,13 @@
 // Shapes of machines as they are drawn.
-import { ByPath, ByState, Graph, HeldMachine, LearnedRate, TransitionCount } from '../server';
+import { ByPath, ByState, Graph, LearnedRate, LiveMachines } from '../server';
 
 export as namespace machine;
 
 /** What the containers of a robot do at a moment. */
-export interface MachineState {
-  alive?: boolean; // false: the robot is gone
-  unwell?: string; // why it waits until it is well
-  control?: HeldMachine[] | null; // how its machines stand as operators see them
-  active: ByPath<string[]>;
-  latest: ByPath<[from: string, to: string]>;
+export interface MachineState extends Pick<LiveMachines, 'active' | 'latest' | 'counts' | 'paths'>,
+  Partial<Pick<LiveMachines, 'alive' | 'unwell'>> {
   failed: ByPath<{ state: string }>;
   rates: ByPath<ByState<ShownRate>>;
-  counts: ByPath<TransitionCount[]>;
-  paths: string[];
 }
 
 export type ShownRate = Pick<LearnedRate, 'rate' | 'class' | 'successes' | 'failures'>;

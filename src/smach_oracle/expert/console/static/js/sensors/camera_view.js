@@ -1,6 +1,6 @@
 // @ts-check
 // A camera, live: colour, or depth in false colours with its range.
-import { h, say, setText } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
 import { drawImage, imageCanvas } from './image_canvas.js';
 import { ImageAge } from './image_age.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
@@ -34,7 +34,7 @@ export class CameraView {
 
   /** @param {string} text */
   say(text) {
-    say(this.note, text);
+    setText(this.note, text);
     this.root.classList.toggle('stale', Boolean(text));
     const { feed } = this; // none yet: it may say something as soon as it is made
     const width = feed && feed.link.isNarrow ? ', ' + feed.link.now + ' px (slow link)' : '';

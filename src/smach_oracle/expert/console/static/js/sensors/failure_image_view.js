@@ -1,7 +1,7 @@
 // @ts-check
 // What a camera gave when a question was put: an image that the server keeps.
 import { ConnectionLost } from '../page/connection.js';
-import { h, say } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
 import { duration } from '../page/format.js';
 import { drawImage, imageCanvas } from './image_canvas.js';
 
@@ -41,7 +41,7 @@ export class FailureImageView {
       const lost = err instanceof TypeError || err instanceof ConnectionLost;
       problem = err instanceof Error && !lost ? err.message : 'The connection was lost.';
     }
-    say(this.note, problem);
+    setText(this.note, problem);
     this.root.classList.toggle('shown', !problem);
   }
 }

@@ -1,6 +1,6 @@
 // @ts-check
 // Joint states: a table, and the chosen ones over the last minute.
-import { h, say } from '../page/dom.js';
+import { h, setText } from '../page/dom.js';
 import { redraw, render } from '../page/redraw.js';
 import { JointPlot, SPAN_S, legendOf } from './joint_plot.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
@@ -35,7 +35,7 @@ export class JointsView {
     /** @type {SensorFeed<server.JointFacts>} */
     this.feed = new SensorFeed(app, () => numberOf(app, topic, type), this.root,
       { every: PERIOD_MS, take: (_, facts) => this.take(facts),
-        say: (text) => say(this.note, text) });
+        say: (text) => setText(this.note, text) });
   }
 
   /** @param {string} topic */

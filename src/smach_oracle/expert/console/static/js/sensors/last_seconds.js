@@ -1,7 +1,7 @@
 // @ts-check
 // The last seconds before a failure: images frame by frame, what happened, and the joints that
 // moved most. Images come once somebody looks for more than the last one.
-import { h, pick, say } from '../page/dom.js';
+import { h, pick, setText } from '../page/dom.js';
 import { keep, render } from '../page/redraw.js';
 import { drawImage, imageCanvas } from './image_canvas.js';
 import { JointPlot, legendOf } from './joint_plot.js';
@@ -235,7 +235,7 @@ export class LastSeconds {
       if (!this.loading) this.load(1);
       return;
     }
-    say(this.note, typeof image === 'string' ? image : '');
+    setText(this.note, typeof image === 'string' ? image : '');
     if (image instanceof Blob) {
       this.drawn = this.drawn.then(() => this.drawFrame(frame.index, image));
     }

@@ -4,7 +4,7 @@ import { CloudLayer, unpacked } from '../drawing/cloud_layer.js';
 import { GridLayer } from '../drawing/grid_layer.js';
 import { SceneView } from '../drawing/scene_view.js';
 import { boxAround, vector } from '../drawing/transforms.js';
-import { h, pick, say, setText } from '../page/dom.js';
+import { h, pick, setText } from '../page/dom.js';
 import { renderWith } from '../page/redraw.js';
 import { ROBOT, RobotFeed, robotOf } from './robot_feed.js';
 import { SensorFeed, numberOf } from './sensor_feed.js';
@@ -27,7 +27,7 @@ export class LiveScene {
     this.scene = new SceneView(topic, () => this.home());
     this.choice = h('select', {});
     this.count = h('span', { class: 'dim number' });
-    this.lack = h('p', { class: 'view-lack dim', hidden: true });
+    this.lack = h('p', { class: 'view-lack dim' });
     this.root = h('figure', { class: 'view cloud-view', 'data-topic': topic }, this.scene.root,
       h('figcaption', {}, h('div', { class: 'row' }, h('span', { class: 'ellipsis' }, topic),
         h('span', { class: 'spacer' }), this.count, this.choice), this.lack));
@@ -174,7 +174,7 @@ export class LiveScene {
     const lacks = this.robot ? this.robot.lacks : '';
     const lost = this.cloud && this.robot && this.cloud.facts.astray;
     const text = [lost, cloud, lacks || robot].filter(Boolean).join(' ');
-    say(this.lack, something ? text : '');
+    setText(this.lack, something ? text : '');
   }
 }
 

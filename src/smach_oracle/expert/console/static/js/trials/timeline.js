@@ -6,7 +6,6 @@ import { duration } from '../page/format.js';
 import { redraw } from '../page/redraw.js';
 import { MARKS, laneOf, lanesOf, questionBars, stateBars, ticks } from './time_axis.js';
 
-/** @typedef {{ left: number, right: number, begin: number, whole: number }} Scale px and s */
 /** @typedef {{ from: number, to: number }} Part of the axis, s since the epoch */
 /** @typedef {Pick<import('./trial_replay.js').TrialReplay, 'pick' | 'seek' | 'key'>} Replay */
 
@@ -35,8 +34,7 @@ export class Timeline {
     /** @type {server.TrialEvent[]} */
     this.events = [];
     this.end = 0;
-    /** @type {Scale | null} */
-    this.scale = null; // null: nothing is drawn
+    this.width = 0; // px; 0: nothing is drawn
     /** @type {string[]} */
     this.shownLanes = [];
     this.picked = -1; // number of an event
@@ -73,7 +71,7 @@ export class Timeline {
 
   /** @param {PointerEvent} event */
   isOnNames(event) {
-    return this.xOf(event) < (this.scale ? this.scale.left : 0) - 12;
+    return this.xOf(event) < this.left - 12;
   }
 
   /**
@@ -84,11 +82,19 @@ export class Timeline {
 
   /** @param {PointerEvent} event */
   seek(event) {
-    if (!this.scale) return;
-    const { left, right, begin, whole } = this.scale;
-    const share = (this.xOf(event) - left) / (right - left);
-    this.replay.seek(begin + whole * Math.min(1, Math.max(0, share)));
+    if (!this.width) return;
+    const share = (this.xOf(event) - this.left) / (this.width - RIGHT - this.left);
+    this.replay.seek(this.begin + this.whole * Math.min(1, Math.max(0, share)));
   }
+
+  /** px where the axis begins. */
+  get left() { return Math.min(NAME, this.width * 0.3); }
+
+  /** When the part that is shown begins. */
+  get begin() { return this.part ? this.part.from : this.events[0].t; }
+
+  /** How long it is, s. */
+  get whole() { return Math.max((this.part ? this.part.to : this.end) - this.begin, 0.001); }
 
   /**
    * The cursor to a time.
@@ -97,16 +103,12 @@ export class Timeline {
    */
   place(t, words) {
     this.placed = { t, words };
-    if (!this.scale) return;
+    if (!this.width) return;
     if (this.part && (t < this.part.from || t > this.part.to)) this.moveTo(t);
-    const { left, right, begin, whole } = this.scale;
-    const share = Math.min(1, Math.max(0, (t - begin) / whole));
-    const at = left + (right - left) * share;
-    this.handle.style.setProperty('--at', at + 'px');
-    this.cursor.style.setProperty('--at', at + 'px');
+    this.root.style.setProperty('--at', this.x(t) + 'px');
     const first = this.events[0].t;
     this.slider.setAttribute('aria-valuemax', (this.end - first).toFixed(2));
-    this.slider.setAttribute('aria-valuenow', (begin + whole * share - first).toFixed(2));
+    this.slider.setAttribute('aria-valuenow', (t - first).toFixed(2));
     this.slider.setAttribute('aria-valuetext', words);
   }
 
@@ -115,8 +117,8 @@ export class Timeline {
    * @param {number} factor above 1: shorter; 0: the whole trial
    */
   zoom(factor) {
-    if (!this.scale || !this.events.length) return;
-    const { begin, whole } = this.scale;
+    if (!this.width) return;
+    const { begin, whole } = this;
     const first = this.events[0].t;
     const span = factor ? Math.max(whole / factor, SHORTEST_S) : Infinity;
     const at = Math.min(begin + whole, Math.max(begin, this.placed ? this.placed.t : begin));
@@ -182,21 +184,17 @@ export class Timeline {
   drawPart() {
     const width = this.canvas.clientWidth;
     const empty = !this.events.length || width < NARROWEST;
+    this.width = empty ? 0 : width;
     this.slider.hidden = this.cursor.hidden = empty;
     if (empty) {
       redraw(this.lanes, h('p', { class: 'empty' }, 'No events.'));
-      this.scale = null;
       return;
     }
-    const first = this.events[0].t;
-    const begin = this.part ? this.part.from : first;
-    const whole = Math.max((this.part ? this.part.to : this.end) - begin, 0.001);
-    const left = Math.min(NAME, width * 0.3);
-    this.scale = { left, right: width - RIGHT, begin, whole };
     this.shownLanes = lanesOf(this.events);
-    const shown = ticks(whole, Math.max(2, (width - left) / 62), begin - first);
-    redraw(this.axis, this.drawAxis(width, shown));
-    redraw(this.lanes, this.drawLanes(width, shown, this.scale));
+    const shown = ticks(this.whole, Math.max(2, (width - this.left) / 62),
+      this.begin - this.events[0].t);
+    redraw(this.axis, this.drawAxis(shown));
+    redraw(this.lanes, this.drawLanes(shown));
   }
 
   /**
@@ -211,8 +209,8 @@ export class Timeline {
    * @param {number} t
    */
   x(t) {
-    const { left, right, begin, whole } = this.scale || { left: 0, right: 0, begin: 0, whole: 1 };
-    return left + (right - left) * Math.min(1, Math.max(0, (t - begin) / whole));
+    const { left, width, begin, whole } = this;
+    return left + (width - RIGHT - left) * Math.min(1, Math.max(0, (t - begin) / whole));
   }
 
   /**
@@ -221,25 +219,18 @@ export class Timeline {
    */
   y(lane) { return TOP + this.shownLanes.indexOf(lane) * LANE; }
 
-  /**
-   * @param {number} width
-   * @param {number[]} shown ticks
-   */
-  drawAxis(width, shown) {
-    const begin = this.events[0].t;
+  /** @param {number[]} shown ticks */
+  drawAxis(shown) {
+    const { width, events: [{ t: begin }] } = this;
     return svg('svg', { width, height: AXIS, viewBox: '0 0 ' + width + ' ' + AXIS,
       'aria-hidden': true }, shown.map((tick) => svg('text', { class: 'tick-text',
       x: Math.min(this.x(begin + tick), width - 26), y: 16 },
     tick < 10 ? Math.round(tick * 100) / 100 + ' s' : duration(tick))));
   }
 
-  /**
-   * @param {number} width
-   * @param {number[]} shown ticks
-   * @param {Scale} scale
-   */
-  drawLanes(width, shown, { left }) {
-    const begin = this.events[0].t;
+  /** @param {number[]} shown ticks */
+  drawLanes(shown) {
+    const { width, left, events: [{ t: begin }] } = this;
     const height = TOP + this.shownLanes.length * LANE + 6;
     this.cursor.style.setProperty('--height', height + 'px');
     const bars = [...stateBars(this.events, this.end), ...questionBars(this.events, this.end)];
