@@ -100,8 +100,9 @@ export class Connection {
 
   /** @returns {Promise<server.Session>} */
   async whoAmI() {
-    const signal = AbortSignal.timeout(SESSION_LIMIT_MS);
-    const answer = await fetch('session', { cache: 'no-store', signal });
+    const limit = new AbortController();
+    setTimeout(() => limit.abort(), SESSION_LIMIT_MS);
+    const answer = await fetch('session', { cache: 'no-store', signal: limit.signal });
     if (!answer.ok) throw new ConnectionLost();
     return answer.json();
   }

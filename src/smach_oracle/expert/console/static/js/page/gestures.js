@@ -20,7 +20,7 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 
 export class Gestures {
   /**
-   * @param {HTMLElement | SVGElement} element
+   * @param {GlobalEventHandlers} element
    * @param {Moves} moves
    */
   constructor(element, moves) {

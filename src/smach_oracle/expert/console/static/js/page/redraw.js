@@ -150,7 +150,7 @@ function put(element, nodes) {
   for (const node of [...element.childNodes]) if (!wanted.has(node)) node.remove();
   let at = element.firstChild;
   for (const node of wanted) {
-    if (node.parentNode === element && node.contains(document.activeElement)) {
+    if (node !== at && node.parentNode === element && node.contains(document.activeElement)) {
       while (at && at !== node) { // it keeps the focus; those before it move
         const next = at.nextSibling;
         element.append(at);

@@ -2,7 +2,7 @@
 // A small picture of a whole drawing, in its corner, with a frame around what is seen. It is for
 // the pointer: the keyboard has search and arrow keys.
 import { svg } from '../page/dom.js';
-import { keep, redraw, render } from '../page/redraw.js';
+import { keep, redrawWith, render } from '../page/redraw.js';
 import { activeIn } from './focus_state.js';
 
 /** @typedef {import('./graph_viewport.js').Place} Place */
@@ -28,9 +28,10 @@ export class GraphMap {
   set({ path, states }, machine) {
     const active = activeIn(path, machine);
     const failed = machine.failed[path]?.state;
-    redraw(this.states, states.map(({ label, at }) => at && svg('rect', {
-      class: label === failed ? 'failed' : active.includes(label) ? 'active' : '',
-      x: at[0] - at[2] / 2, y: at[1] - at[3] / 2, width: at[2], height: at[3] })));
+    redrawWith(this.states, [states, active, failed], () => (
+      states.map(({ label, at }) => at && svg('rect', {
+        class: label === failed ? 'failed' : active.includes(label) ? 'active' : '',
+        x: at[0] - at[2] / 2, y: at[1] - at[3] / 2, width: at[2], height: at[3] }))));
   }
 
   /**

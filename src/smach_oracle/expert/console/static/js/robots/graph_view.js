@@ -2,7 +2,7 @@
 // One container drawn from the positions that dot gave the server. ORACLE is a rail at the right
 // side: every state's edge to it and back is a short line, pale until it was used.
 import { h, svg } from '../page/dom.js';
-import { Cards, redraw, whenLetGo } from '../page/redraw.js';
+import { Cards, redrawWith, whenLetGo } from '../page/redraw.js';
 import {
   arrowHeads, edgeShape, measured, oracleEdgeShape, oracleLines, oracleShape, outcomeShape,
   stateShape,
@@ -54,12 +54,13 @@ export class GraphView {
   set(robot, graph, machine) {
     const key = JSON.stringify([robot, graph]);
     const focus = focusState(graph, machine);
-    const moves = key !== this.key || focus !== this.focus;
+    const moves = key !== this.key || (this.viewport.follow && focus !== this.focus);
     if (key !== this.key) this.shapes = newShapes();
     Object.assign(this, { key, focus, states: graph.states });
     this.viewport.size = measured(graph);
     this.drawing.setAttribute('aria-label', 'States of ' + graph.path);
-    redraw(this.layer, this.view(robot + '/' + graph.path + '/', graph, machine));
+    redrawWith(this.layer, [key, machine, this.found], () => (
+      this.view(robot + '/' + graph.path + '/', graph, machine)));
     this.map.set(graph, machine);
     if (moves) whenLetGo(this.root, () => this.viewport.place());
   }
