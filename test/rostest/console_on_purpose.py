@@ -197,6 +197,39 @@ return import("/static/js/robots/hand_words.js").then(({ standingWords }) => {
     words("", [], { ...asked, status: "pending" }),
     words("ORACLE", [], { ...asked, status: "interface" })];
 });"""
+# many buttons in a box that shows few of them: how often within a second it is looked for what lies
+# over a button; whether the first one, and the last one, are settled before that one is scrolled to,
+# at once after that, and later
+MANY = """
+const done = arguments[arguments.length - 1];
+const box = document.createElement("div");
+box.style.cssText = "position: fixed; left: 0; top: 0; height: 200px; overflow: auto; z-index: 99";
+for (let number = 0; number < 300; number += 1) {
+  const button = document.createElement("button");
+  button.dataset.deliberate = button.textContent = "made-up " + number;
+  button.style.display = "block";
+  box.append(button);
+}
+document.body.append(box);
+const [first, last] = [box.firstChild, box.lastChild];
+const settled = () => [first, last].map((button) => button.hasAttribute("data-settled"));
+const pause = (ms) => new Promise((over) => setTimeout(over, ms));
+const look = document.elementFromPoint.bind(document);
+(async () => {
+  await pause(2500);
+  const found = [settled()];
+  let looks = 0;
+  document.elementFromPoint = (x, y) => { looks += 1; return look(x, y); };
+  await pause(1000);
+  delete document.elementFromPoint;
+  last.scrollIntoView();
+  await pause(200);
+  found.push(settled());
+  await pause(2500);
+  found.push(settled());
+  box.remove();
+  done([looks, ...found]);
+})();"""
 REFUSED = 'the page had just changed there'
 
 
@@ -249,6 +282,14 @@ class OnPurpose(ConsolePage, unittest.TestCase):
         )
         browser.driver.refresh()
         self.assertEqual(self.answers(), [])
+
+    def test_0_what_is_out_of_sight_is_looked_at_seldom_and_settles_once_it_is_seen(self):
+        self.browser.driver.set_script_timeout(40)
+        looks, *found = self.browser.driver.execute_async_script(MANY)
+        self.assertLess(looks, 1500, 'with all of them ten times a second it is 3000')
+        self.assertTrue(found[0][0], 'it lies there')
+        self.assertEqual(found[1], [False, False], 'one is gone, the other has just come')
+        self.assertTrue(found[2][1], 'it has been seen for long enough')
 
     def test_1_the_second_tap_of_a_double_tap_answers_nothing(self):
         browser = self.browser

@@ -20,6 +20,7 @@ import { justGiven } from './focus.js';
 
 export const SETTLING_MS = 700;
 export const PERIOD_MS = 100;
+const OUT_OF_SIGHT = 10; // how much more seldom those are looked at that are out of sight
 const SELECTOR = '[data-deliberate]';
 const HELD = /^hold /;
 const OPENS = /^open /;
@@ -27,8 +28,11 @@ const HOLDING = new Set(['Enter', ' ']); // the keys that press what has the foc
 const STILL = 4; // px by which an element may move and yet lie under the same finger
 const TOO_SOON = 'Not sent: the page had just changed there. Press again.';
 
-/** @type {Map<HTMLElement, Rest>} */
-let rests = new Map(); // of those that can be pressed
+/** @type {WeakMap<Element, Rest>} */
+let rests = new WeakMap(); // of those that can be pressed
+/** @type {WeakMap<Element, boolean>} */
+const inSight = new WeakMap(); // of all that were ever seen here
+let looks = 0;
 /** @type {{ element: HTMLElement, meaning: string, settled: boolean } | null} */
 let pressed = null;
 /** @type {Event | null} the newest click that has opened something, and came too soon */
@@ -40,9 +44,21 @@ export function watchOverClicks() {
   window.addEventListener('click', (event) => judge(event), true);
   window.addEventListener('keydown', (event) => holdByKey(event), true);
   document.addEventListener('visibilitychange', () => {
-    if (!document.hidden) rests.clear(); // what lay there before is not remembered
+    if (!document.hidden) rests = new WeakMap(); // what lay there before is not remembered
   });
-  setInterval(look, PERIOD_MS);
+  const sight = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) {
+      inSight.set(target, isIntersecting);
+      if (!isIntersecting) forget(target); // it may come back to the same place
+    }
+  });
+  setInterval(() => look(sight), PERIOD_MS);
+}
+
+/** @param {Element} element */
+function forget(element) {
+  rests.delete(element);
+  element.removeAttribute('data-settled');
 }
 
 /**
@@ -76,18 +92,25 @@ export function sayTooSoon() {
   toast(TOO_SOON, 'warn');
 }
 
-function look() {
+/** @param {IntersectionObserver} sight */
+function look(sight) {
   const nowMs = performance.now();
-  const before = rests;
-  const now = new Map();
+  looks += 1;
   for (const element of document.querySelectorAll(SELECTOR)) {
     if (!(element instanceof HTMLElement)) continue;
+    if (!inSight.has(element)) {
+      inSight.set(element, true); // as long as nothing else is known
+      sight.observe(element);
+    }
+    if (!inSight.get(element) && looks % OUT_OF_SIGHT) continue;
+    const before = rests.has(element);
     const rest = restOf(element, nowMs);
-    if (rest) now.set(element, rest);
-    element.toggleAttribute('data-settled',
-      Boolean(rest && before.has(element) && nowMs - rest.sinceMs >= SETTLING_MS));
+    if (!rest) forget(element);
+    else {
+      rests.set(element, rest);
+      element.toggleAttribute('data-settled', before && nowMs - rest.sinceMs >= SETTLING_MS);
+    }
   }
-  rests = now;
 }
 
 /**
