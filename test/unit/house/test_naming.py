@@ -85,7 +85,7 @@ def test_nothing_has_a_name_that_does_not_say_what_it_is():
 
 def test_the_names_in_scripts_are_found():
     names = {name for path in SCRIPTS for name in names_in_script(path)}
-    assert len(names) > 400 and {'SensorFeed', 'counted', 'sayOfRobot', 'stop'} <= names
+    assert len(names) > 400 and {'SensorFeed', 'counted', 'startRobot', 'stop'} <= names
 
 
 def test_every_section_of_the_page_says_what_it_holds():

@@ -1,6 +1,6 @@
 // @ts-check
-// Moving what is drawn on an element: one finger or a pressed button drags, two fingers or the wheel
-// zoom; while it has the focus the arrow keys drag, + and - zoom.
+// Moving what is drawn on an element: one finger or a pressed button drags, two fingers or the
+// wheel zoom; while it has the focus the arrow keys drag, + and - zoom.
 import { modified } from './dom.js';
 
 /**

@@ -39,8 +39,8 @@ export function render(element, view) { whenLetGo(element, () => { alike(element
 /**
  * As if the element's children were replaced by these, which were made again; but those that are
  * there become like them, each like the one of its kind and `key`. Those that stay are not taken
- * out, not even for a moment: that would cost them focus and scroll position, and the click that has
- * begun on them.
+ * out, not even for a moment: that would cost them focus and scroll position, and the click that
+ * has begun on them.
  * @param {Element} element
  * @param {...page.Child} children
  */

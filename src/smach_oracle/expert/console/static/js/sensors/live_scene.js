@@ -23,7 +23,7 @@ export class LiveScene {
   constructor(app, topic, type) {
     this.app = app;
     this.topic = topic;
-    this.ofRobot = type === ROBOT; // a cloud may join it; else it is a cloud, which a robot may join
+    this.ofRobot = type === ROBOT; // which a cloud may join; else a cloud, which a robot may join
     this.scene = new SceneView(topic, () => this.home());
     this.choice = h('select', {});
     this.count = h('span', { class: 'dim number' });
