@@ -34,8 +34,9 @@ MIDDLE = (
     '.getImageData(c.width / 2, c.height * 0.7, 1, 1).data; return [p[0], p[1], p[2]]'
 )
 
-# px of a minute of work before a wait of 15, on the whole axis and on a part of it around the
-# cursor; whether it is drawn where the cursor is far away; and on the whole axis again
+# whether the cursor is on a minute of work, on a part of the axis around it; px of that minute
+# before a wait of 15, on the whole axis and on the part; whether it is drawn where the cursor is
+# far away; and on the whole axis again
 ZOOMED = """
 return import("/static/js/trials/timeline.js").then(({ Timeline }) => {
   const line = new Timeline({ pick() {}, seek() {}, key() {} });
@@ -45,17 +46,21 @@ return import("/static/js/trials/timeline.js").then(({ Timeline }) => {
     ["query_answered", 960]].map(([kind, t], seq) => (
     { seq, kind, t, path: "TOP", state: "PICK", words: kind }));
   const width = () => Number(line.root.querySelector("rect.bar.bad")?.getAttribute("width") || 0);
+  const sides = (part) => line.root.querySelector(part).getBoundingClientRect();
   line.set(events, 960);
   line.place(30, "");
   const found = [width()];
   line.zoom(16);
   found.push(width());
+  const bar = sides("rect.bar.bad");
+  const on = [".cursor-handle", ".cursor-line"].map(sides).every(
+    ({ left, right }) => left > bar.left && right < bar.right);
   line.place(900, "");
   found.push(width());
   line.zoom(0);
   found.push(width());
   line.root.remove();
-  return found;
+  return [on, ...found];
 });"""
 
 
@@ -254,7 +259,8 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
         self.assertEqual(browser.errors(), [])
 
     def test_9_a_part_of_the_time_axis_can_be_seen_larger(self):
-        whole, part, elsewhere, again = self.browser.run(ZOOMED)
+        on, whole, part, elsewhere, again = self.browser.run(ZOOMED)
+        self.assertTrue(on, 'the cursor is on the bar')
         self.assertGreater(part, 5 * whole)
         self.assertEqual((elsewhere, again), (0, whole))
 

@@ -26,7 +26,7 @@ return Math.abs(row.top + row.height / 2 - frame.top - frame.height / 2);"""
 # a panel that is drawn twice, once while something in it is pressed: what stays, what is heard
 VIEWS = """const scripts = ["dom.js", "redraw.js"];
 return Promise.all(scripts.map((name) => import("/static/js/page/" + name))).then(
-([{ h }, { keep, render }]) => {
+([{ h, pick }, { keep, render }]) => {
   const heard = [];
   const kept = h("canvas", {});
   const typed = h("input", {});
@@ -52,8 +52,12 @@ return Promise.all(scripts.map((name) => import("/static/js/page/" + name))).the
   const other = h("canvas", {});
   for (const each of [kept, other]) render(root, h("section", {}, keep(each)));
   const turned = root.firstElementChild === other && root.childElementCount === 1;
+  for (const names of [[], ["a", "b", "c"]]) {
+    render(root, h("section", {}, pick({}, names.map((name) => [name, name]), "a", () => {})));
+  }
+  const picked = root.querySelector("select").value;
   root.remove();
-  return { heard: heard.join(), stays, focused, waits, after, turned };
+  return { heard: heard.join(), stays, focused, waits, after, turned, picked };
 })"""
 
 
@@ -213,6 +217,7 @@ class LargeMachines(ConsolePage, unittest.TestCase):
                 'waits': 'of-2 true',
                 'after': 'of-3 false',
                 'turned': True,  # one that is kept is never made like another one
+                'picked': 'a',  # of options that come later
             },
         )
 

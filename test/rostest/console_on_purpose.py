@@ -198,8 +198,8 @@ return import("/static/js/robots/hand_words.js").then(({ standingWords }) => {
     words("ORACLE", [], { ...asked, status: "interface" })];
 });"""
 # many buttons in a box that shows few of them: how often within a second it is looked for what lies
-# over a button; whether the first one, and the last one, are settled before that one is scrolled to,
-# at once after that, and later
+# over a button; whether the first one, and the last one, are settled before that one is scrolled
+# to, at once after that, and later
 MANY = """
 const done = arguments[arguments.length - 1];
 const box = document.createElement("div");

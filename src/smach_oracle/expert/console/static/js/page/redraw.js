@@ -61,6 +61,9 @@ export function redraw(element, ...children) {
       const old = (before.get(nameOf(node)) || []).shift();
       return old ? alike(old, node) : fillPlaces(node);
     }));
+    // as options leave the select of a view, that one chooses others
+    const chosen = element instanceof HTMLSelectElement && element.querySelector('[selected]');
+    if (chosen instanceof HTMLOptionElement && !chosen.selected) chosen.selected = true;
   });
 }
 
@@ -201,8 +204,6 @@ function copyAttributes(from, to) {
   if (from instanceof HTMLInputElement && to instanceof HTMLInputElement) {
     to.checked = from.checked; // the attribute says how it was at first
   }
-  const chosen = from.hasAttribute('selected') && to instanceof HTMLOptionElement;
-  if (chosen && !to.selected) to.selected = true;
 }
 
 /**
