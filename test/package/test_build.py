@@ -5,12 +5,16 @@ yields to upstream.
 import re
 
 import pytest
-from workspace import PYTHON, copy_sources, fake_upstream, run
+from workspace import PYTHON, copy_sources, fake_upstream, leave_one_of_each, run
 
 NAMES = ('smach', 'smach_ros', 'smach_msgs', 'control_msgs')
 WHERE = (
     'python3 -c "import smach_oracle.oracle, smach, smach_ros, smach_msgs, control_msgs; '
     'print(smach.__file__, smach_ros.__file__, smach_msgs.__file__, control_msgs.__file__)"'
+)
+MESSAGES = (
+    'from smach_oracle.msg import SeenThing, SharedAutonomyAction; '
+    'from smach_oracle.srv import Recognise'
 )
 SCRIPT = """
 import smach
@@ -168,7 +172,7 @@ def test_upstream_may_come_after_the_installation_and_go_again(installed, tmp_pa
 
 
 def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
-    copy_sources(tmp_path / 'src/smach_oracle')
+    leave_one_of_each(copy_sources(tmp_path / 'src/smach_oracle'))
     for name in NAMES:
         fake_upstream(tmp_path / 'src', name)
     run('catkin_make {}'.format(PYTHON), tmp_path)
@@ -176,7 +180,7 @@ def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
     assert where.count('devel') + where.count(str(tmp_path / 'src')) >= len(NAMES)
     assert 'stand_ins' not in where
     check = (
-        'import smach_oracle, smach, smach_ros, smach_msgs; '
+        'import smach_oracle, smach, smach_ros, smach_msgs; ' + MESSAGES + '; '
         'print(smach.upstream, smach_ros.upstream)'
     )
     assert 'True True' in run(
@@ -185,10 +189,13 @@ def test_a_catkin_workspace_uses_upstream_where_it_has_it(tmp_path):
 
 
 def test_an_isolated_workspace_takes_of_ours_what_it_lacks(tmp_path):
-    copy_sources(tmp_path / 'src/smach_oracle')
+    leave_one_of_each(copy_sources(tmp_path / 'src/smach_oracle'))
     fake_upstream(tmp_path / 'src', 'smach')
     run('catkin_make_isolated --cmake-args {}'.format(PYTHON), tmp_path)
-    check = 'import smach_oracle, smach, control_msgs; print(smach.upstream, control_msgs.__file__)'
+    check = (
+        'import smach_oracle, smach, control_msgs; ' + MESSAGES + '; '
+        'print(smach.upstream, control_msgs.__file__)'
+    )
     told = run(
         'python3 -c "{}"'.format(check), tmp_path, str(tmp_path / 'devel_isolated/setup.bash')
     )

@@ -8,6 +8,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 LEFT_OUT = ('.git', '.venv*', 'build', '.build', '__pycache__', '*.pyc', '.*_cache')
 RESULTS = (ROOT / 'trials', ROOT / 'doc/trials')  # a package of src/ may have that name too
+# of each kind one, with the messages that it names
+ONE_OF_EACH = ('UserdataItem.msg', 'SeenThing.msg', 'Recognise.srv', 'SharedAutonomy.action')
 UPSTREAM_CMAKE = """cmake_minimum_required(VERSION 3.5)
 project({0})
 find_package(catkin REQUIRED)
@@ -37,6 +39,17 @@ def copy_sources(target: Path) -> Path:
 
     shutil.copytree(str(ROOT), str(target), ignore=left_out)
     return target
+
+
+def leave_one_of_each(sources: Path) -> None:
+    """Take away all messages but one of each kind.
+
+    Each is made by a process of its own, and there are more than a hundred.
+    """
+    for kind in ('msg', 'srv', 'action'):
+        for path in (sources / kind).iterdir():
+            if path.name not in ONE_OF_EACH:
+                path.unlink()
 
 
 def fake_upstream(source_space: Path, name: str) -> None:
