@@ -169,8 +169,9 @@ def test_the_id_of_a_question_keeps_its_old_name_with_a_warning():
     machine, expert = asking(goto('C'))
     machine.run()
     (question,) = expert.questions
-    with pytest.warns(FutureWarning, match='query_id is now called question_id'):
+    with pytest.warns(FutureWarning, match='query_id is now called question_id') as told:
         assert question.query_id == question.question_id
+    assert told[0].filename == __file__
 
 
 def test_nonsense_without_end_ends_at_the_deadline_and_does_not_spin():

@@ -10,7 +10,7 @@ from machines import FakeExpert, Scripted, chain_of, supersede
 
 import smach
 import smach_oracle.oracle
-from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle import OracleContainer, errors, oracle_of
 from smach_oracle.oracle.asking import question
 from smach_oracle.oracle.records.events import EventKind
 
@@ -107,3 +107,11 @@ def test_what_an_expert_of_ones_own_needs_is_found_at_the_top_and_at_its_old_pla
     assert getattr(old, name) is getattr(question, name)
     assert getattr(smach_oracle.oracle, name) is getattr(question, name)
     assert name in smach_oracle.oracle.__all__
+
+
+def test_the_old_name_of_an_error_warns_in_the_line_that_uses_it():
+    with pytest.warns(FutureWarning, match='is now called SettingsError') as told:
+        assert errors.ConfigError is errors.SettingsError
+    assert told[0].filename == __file__
+    with pytest.raises(AttributeError, match='NoSuchError'):
+        errors.__getattr__('NoSuchError')

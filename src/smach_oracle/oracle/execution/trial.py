@@ -4,7 +4,8 @@ Also what one execution of any container begins and ends.
 """
 
 import time
-from typing import Callable, Dict, Iterable, List, Optional, Set, Tuple
+from functools import lru_cache
+from typing import Callable, Dict, Iterable, List, Optional, Tuple
 
 import smach
 from smach_oracle.forking import in_child
@@ -205,14 +206,15 @@ UNKNOWN_ENDS = (
     '"other end". To settle it, list all failing ends in failing_outcomes, or choose a name that '
     'says it, such as {}_succeeded'
 )
-_MOST_TOLD = 1000  # machines. A program may make up machines without end
-_told: Set[Tuple[str, Tuple[str, ...]]] = set()
 
 
 def tell_unknown_ends(name: str, ends: Iterable[object], rule: FailureRule) -> None:
     """Name the ends of a top machine whose meaning is not known, once in a process."""
     unknown = rule.unknown(ends)
-    if not unknown or (name, unknown) in _told or len(_told) >= _MOST_TOLD:
-        return
-    _told.add((name, unknown))
+    if unknown:
+        _tell_once(name, unknown)
+
+
+@lru_cache(maxsize=1000)  # a program may make up machines without end
+def _tell_once(name: str, unknown: Tuple[str, ...]) -> None:
     smach.loginfo(UNKNOWN_ENDS.format(name, ' or '.join(unknown), unknown[0]))
