@@ -4,21 +4,10 @@ told that the object is. Its interfaces lie in its own namespace.
 """
 
 import rospy
+from console_marking_robot import OUTCOMES, Detect
 
 import smach
 from smach_oracle import OracleContainer
-
-OUTCOMES = ['succeeded', 'aborted', 'preempted']
-
-
-class Detect(smach.State):
-    """Always fails."""
-
-    def __init__(self):
-        smach.State.__init__(self, OUTCOMES, output_keys=['table', 'objects', 'sizes'])
-
-    def execute(self, ud):
-        return 'aborted'
 
 
 class Pick(smach.State):
