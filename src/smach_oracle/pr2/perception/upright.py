@@ -23,7 +23,10 @@ BLUR = 0.005  # m by which an edge is seen beside where it is
 UPRIGHT = 0.82
 # rad from which a thing does not count as standing. The measure errs by one or two degrees
 LEANS = np.radians(15.0)
-STEEPEST = np.radians(60.0)  # of a top. What is steeper is a side
+STEEPEST = np.radians(60.0)  # of a plane that is looked for. What is steeper is a side
+# rad of a top. A plane between this and the steepest one runs through a top and a side: of a slim
+# thing that leans by 20 degrees, such a one may have more points than the top
+TOP = np.radians(50.0)
 FLAT = 0.004  # m that the points of a top may lie off its plane
 LEAST_TOP = 25  # points of a top
 # m by which what leans by 15 degrees is wider than what stands. Noise, and a map that is off, make
@@ -128,7 +131,8 @@ def _lean_of(
     """Return the inclination of the top of a thing (n, 3), rad, or None where it has none."""
     upper = points[points[:, 2] > centre[2]]
     top = find_plane(upper, generator_of(image), FLAT, STEEPEST, LEAST_TOP)
-    return None if top is None else float(np.arccos(min(1.0, top.normal[2])))
+    lean = np.pi if top is None else float(np.arccos(min(1.0, top.normal[2])))
+    return lean if lean < TOP else None
 
 
 def _colour_of(colours: np.ndarray) -> Optional[np.ndarray]:

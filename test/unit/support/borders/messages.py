@@ -34,7 +34,6 @@ from smach_oracle.msg import (
 )
 from smach_oracle.oracle.asking.question import AnswerKind
 from smach_oracle.oracle.errors import AnswerError
-from smach_oracle.oracle.settings.interfaces import InterfaceOffer
 from smach_oracle.ros.expert import client, server
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.ros.hand import hand_server
@@ -143,12 +142,12 @@ def _take_result(result: ExpertQueryResult) -> str:
 
 
 def _take_handed_over(result: SharedAutonomyResult) -> str:
-    said: List[str] = []
-    with fake_ros(), mock.patch.object(
-        client.rospy, 'logwarn', lambda text, *given: said.append(text % given)
-    ):
-        answer = client._to_supersede(InterfaceOffer('assist', '/assist'), result)
-    return refused(''.join(said)) if answer is None else TAKEN
+    with fake_ros():
+        try:
+            client._to_supersede(result)
+        except AnswerError as err:
+            return refused(err)
+    return TAKEN
 
 
 # -- an operator's hand
