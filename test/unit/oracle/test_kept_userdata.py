@@ -4,6 +4,8 @@ import pytest
 from guarded_machines import chain
 from machines import FakeExpert, Scripted, Watched, goto
 
+import smach
+from smach_oracle.oracle.machine.userdata import WriteWatch
 from smach_oracle.oracle.records.events import EventKind
 
 IO = {'input_keys': ['x'], 'output_keys': ['x']}
@@ -126,3 +128,16 @@ def test_a_value_that_a_precondition_leaves_as_it_is_counts_as_written_after_the
     seen = []
     run(chain(A=Scripted(writes, writes, **IO)), preconditions={'A': [confirms, looks]})
     assert seen == ['at the start', 'written']
+
+
+def test_what_another_branch_has_written_since_is_not_taken_back():
+    machine = smach.StateMachine(['done'])
+    watch = WriteWatch(machine, ())
+    watch.begin()
+    watch.gate['x'] = 'by a precondition that is met'
+    begun = watch.begin()
+    machine.userdata.x = 'by another branch'
+    watch.gate['y'] = 'by one that is not met'
+    watch.take_back_own(begun)
+    assert machine.userdata.x == 'by another branch'
+    assert 'y' not in machine.userdata

@@ -214,3 +214,13 @@ def test_a_stop_is_not_over_while_its_preempt_is_under_way():
     with control.stop():
         control.stop_is_over()
         assert not control.holds_all
+
+
+def test_once_a_stop_is_over_a_machine_need_not_look_for_an_operator():
+    control = Control(Clock())
+    control.pause()
+    with control.stop():
+        pass
+    assert control.is_set, 'it lifts the pause on its way'
+    control.stop_is_over()
+    assert not control.is_set
