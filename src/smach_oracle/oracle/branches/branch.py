@@ -86,11 +86,7 @@ class Branch(smach.Container):
         # a thread of an earlier execution may have been left behind in it
         self._execution_number += 1
         # the same for all items
-        self._is_watched = bool(
-            node.in_force.limits_autonomy
-            or node.tree.resumed.concerns(node.records)
-            or runs_around(node)
-        )
+        self._is_watched = bool(node.in_force.limits_autonomy or runs_around(node))
         self._find_record()
 
     def _find_record(self) -> None:

@@ -33,8 +33,10 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     containers is preempted.
     """
     level = arrives_at(verdict)
-    left_nodes = [] if level is None else _nodes_left_for(node, level)
-    if level is None or not left_nodes:
+    if level is None:
+        return False
+    left_nodes = _nodes_left_for(node, level)
+    if not left_nodes:
         return False
     departure = Departure(verdict, level, '{}/{}'.format(node.path, label))
     nodes = [*left_nodes, level]

@@ -146,10 +146,6 @@ class ResumedTrial:
             or any(record in self._unfinished for record in records.by_label.values())
         )
 
-    def concerns(self, records: ContainerRecords) -> bool:
-        """Whether anything waits for the next execution of a container."""
-        return records in self._asked or self.goes_on(records)
-
     def forget(self, records: ContainerRecords) -> None:
         """Let a container begin from the start."""
         self._entries.pop(records, None)
