@@ -102,9 +102,11 @@ class TwoRobots(ConsolePage, unittest.TestCase):
             self.mark_the_can(robot)
             browser.find('[data-fact=size]')
             browser.click('.perception .accept')
-            seen = robot + '/robot/seen'
-            self.assertTrue(wait_for(lambda name=seen: rospy.has_param(name)))
-            self.assertLess(np.linalg.norm(np.subtract(rospy.get_param(seen), can.position)), 0.02)
+            picked = robot + '/robot/picked'
+            self.assertTrue(wait_for(lambda name=picked: rospy.has_param(name)))
+            self.assertLess(
+                np.linalg.norm(np.subtract(rospy.get_param(picked), can.position)), 0.02
+            )
         self.assertEqual(browser.errors(), [])
 
     def test_2_the_hand_is_the_one_of_the_robot_that_has_asked(self):

@@ -4,21 +4,21 @@ told that the object is. Its interfaces lie in its own namespace.
 """
 
 import rospy
-from console_marking_robot import OUTCOMES, Detect
+from console_marking_robot import OUTCOMES, Detect, Pick
 
 import smach
 from smach_oracle import OracleContainer
 
 
-class Pick(smach.State):
-    """Always fails."""
+class Grasp(Pick):
+    """Tells where the object is, and never grasps it."""
 
     def __init__(self):
-        smach.State.__init__(self, OUTCOMES, input_keys=['objects'], output_keys=['grasp'])
+        super().__init__()
+        self.register_output_keys(['grasp'])
 
     def execute(self, ud):
-        place = ud.objects[0].pose.position
-        rospy.set_param('~seen', [place.x, place.y, place.z])
+        super().execute(ud)
         return 'aborted'
 
 
@@ -28,7 +28,7 @@ def main():
     sm = smach.StateMachine(OUTCOMES)
     with sm:
         smach.StateMachine.add('DETECT_TABLETOP', Detect(), {'succeeded': 'PICK'})
-        smach.StateMachine.add('PICK', Pick())
+        smach.StateMachine.add('PICK', Grasp())
     OracleContainer.wrap(
         sm,
         name='FETCH',
