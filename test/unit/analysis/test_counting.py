@@ -276,20 +276,34 @@ def test_without_other_processes_this_one_counts(cache, folder, monkeypatch):
     assert len(os.listdir('/proc/self/fd')) == before
 
 
-def test_ctrl_c_ends_all_processes_quietly(cache, folder):
+WHILE_IT_READS = """
+real = EventReader.read
+def slow(self, path):
+    os.write(1, b'.')
+    time.sleep(1.0)
+    return real(self, path)
+EventReader.read = slow
+"""
+WHILE_A_PROCESS_BEGINS = """
+def begin_slowly():
+    os.write(1, b'.')
+    time.sleep(1.0)
+os.register_at_fork(after_in_child=begin_slowly)
+"""
+
+
+@pytest.mark.parametrize(
+    'instant', [WHILE_IT_READS, WHILE_A_PROCESS_BEGINS], ids=['it_reads', 'a_process_begins']
+)
+def test_ctrl_c_ends_all_processes_quietly(instant, cache, folder):
     """The signal goes to the whole group, as that of a terminal does."""
-    script = """
+    script = f"""
 import os, sys, time
 from smach_oracle.analysis.bag_events import EventReader
 from smach_oracle.analysis.counting import bag_counts
 from smach_oracle.analysis.trials import load_trials
 bag_counts.KEPT_FROM = bag_counts.SHARED_FROM = bag_counts.GROUP = 1
-real = EventReader.read
-def slow(self, path):
-    os.write(1, b'.')
-    time.sleep(1.0)  # so that the signal comes while it reads
-    return real(self, path)
-EventReader.read = slow
+{instant}
 try:
     load_trials(sys.argv[1:], None, 2)
 except KeyboardInterrupt:

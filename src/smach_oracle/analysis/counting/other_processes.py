@@ -125,22 +125,27 @@ class _Process:
         numbers, self._numbers = os.pipe()
         self.results, results = os.pipe()
         self._pid: Optional[int] = None
+        # Ctrl-C goes to all processes of a terminal. It waits until a child has said that it does
+        # not hear it: the parent ends it
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             self._pid = os.fork()
+            if not self._pid:
+                try:
+                    signal.signal(signal.SIGINT, signal.SIG_IGN)
+                    signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+                    for process in [*before, self]:  # they are the parent's
+                        process._close_files()
+                    _count_all(numbers, results, counting, paths)
+                finally:
+                    os._exit(0)  # whatever happens: all else is the parent's
         except OSError:
             self._close_files()
+            raise
+        finally:
             os.close(numbers)
             os.close(results)
-            raise
-        if not self._pid:
-            try:
-                for process in [*before, self]:  # they are the parent's
-                    process._close_files()
-                _count_all(numbers, results, counting, paths)
-            finally:
-                os._exit(0)  # whatever happens: all else is the parent's
-        os.close(numbers)
-        os.close(results)
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
     def give(self, group: _BagGroup, numbers: Sequence[int]) -> None:
         """:raises OSError: where the process has died."""
@@ -190,8 +195,6 @@ def _read(paths: Sequence[str], received: _Received) -> List[CountedBag]:
 
 def _count_all(numbers: int, results: int, counting: Counting, paths: Sequence[str]) -> None:
     """Count the bags whose numbers come, until there are no more."""
-    # Ctrl-C goes to all processes of a terminal. The parent ends this one
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
     reader = EventReader()
     with suppress(EOFError, OSError):  # the parent is done, or gone
         while True:
