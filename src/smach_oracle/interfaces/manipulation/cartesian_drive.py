@@ -287,9 +287,11 @@ class CartesianDrive:
 def pulled_back(commanded: np.ndarray, measured: np.ndarray, lead: float) -> np.ndarray:
     """Commanded joint positions (n,), within `lead` rad of the measured ones.
 
-    So pushing at a wall piles up no force.
+    So pushing at a wall piles up no force. All joints are pulled back alike: each by itself would
+    lead the tool away from its course.
     """
-    return measured + np.clip(commanded - measured, -lead, lead)
+    ahead = commanded - measured
+    return measured + ahead * _ratio(lead, float(np.abs(ahead).max()))
 
 
 def _length(vector: np.ndarray) -> float:

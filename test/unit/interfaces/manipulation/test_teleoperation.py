@@ -211,7 +211,22 @@ def test_what_is_not_finite_or_has_the_wrong_shape_is_refused(arm, joints, twist
 
 
 def test_targets_do_not_run_away_from_an_arm_that_is_blocked():
-    assert pulled_back(np.array([1.0, 0.05]), np.zeros(2), 0.1) == pytest.approx([0.1, 0.05])
+    assert pulled_back(np.array([1.0, -0.5]), np.zeros(2), 0.1) == pytest.approx([0.1, -0.05])
+    near = np.array([0.1, -0.05])
+    assert pulled_back(near, np.zeros(2), 0.1) == pytest.approx(near)
+
+
+@pytest.mark.parametrize('axis', range(3))
+@pytest.mark.parametrize('way', [-1.0, 1.0])
+def test_targets_stay_on_course_while_the_arm_stands(arm, axis, way):
+    """A blocked arm that comes free, or a robot that was late, goes where it was sent."""
+    twist = way * 0.25 * np.eye(6)[axis]
+    drive, targets = CartesianDrive(arm), READY
+    for _ in range(50):
+        targets = drive.step(pulled_back(targets, READY, 0.12), twist, PERIOD).joints
+    for at in (targets, pulled_back(targets, READY, 0.05)):
+        gone = (arm.forward(at) - arm.forward(READY))[:3, 3]
+        assert way * gone[axis] > 0.97 * np.linalg.norm(gone)
 
 
 def test_a_hand_that_may_turn_freely_keeps_its_place_while_the_arm_comes_to_its_ease(arm):
