@@ -18,10 +18,10 @@ from selenium.common.exceptions import (
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
-from selenium.webdriver.common.by import By
 from urllib3.exceptions import MaxRetryError
 from waiting import wait_for
 
+EVERY_S = 0.05  # a look at the page takes 4 ms of three processes
 FLAGS = [
     '--headless=new',
     '--no-sandbox',
@@ -40,6 +40,26 @@ NOT_YET = (
     StaleElementReferenceException,
     ElementClickInterceptedException,
     ElementNotInteractableException,
+)
+# WebDriver's own ways to find what is shown, and to read its text, compute 4 and 20 times as long
+SHOWN = """
+const shown = [...document.querySelectorAll(arguments[0])].find((each) => (
+  each.checkVisibility({ opacityProperty: true, visibilityProperty: true })
+  && [...each.getClientRects()].some(({ width, height }) => width || height))) || null;"""
+TEXT = """
+const it = document.querySelector(arguments[0]);
+return it && it.checkVisibility() ? it.innerText ?? it.textContent : "";"""
+# the page refuses a click that comes too soon after a change
+SETTLED = """
+const settled = (it) => {
+  const deliberate = it.closest("[data-deliberate]");
+  if (!deliberate || deliberate.hasAttribute("data-settled")) return true;
+  deliberate.scrollIntoView({ block: "center" });
+  return false;
+};"""
+CLICKABLE = (
+    SHOWN + SETTLED + 'return shown && !shown.matches(":disabled") && settled(shown)'
+    ' ? [shown, document.body.dataset.refused] : null;'
 )
 
 
@@ -75,7 +95,7 @@ class Browser:
 
     def find(self, selector, limit_s=40.0):
         """The first element that is there and shown; raises where none comes in time."""
-        found = wait_for(lambda: self._shown(selector), limit_s)
+        found = wait_for(lambda: self._shown(selector), limit_s, EVERY_S)
         if not found:
             raise AssertionError(
                 'nothing on the page for {!r}; it says:\n{}'.format(selector, self.text()[:2000])
@@ -89,16 +109,16 @@ class Browser:
 
         def clicked():
             try:
-                element = self._shown(selector)
-                if element is None or not element.is_enabled() or not self.settled(element):
+                found = self.run(CLICKABLE, selector)
+                if not found:
                     return False
-                before = self._refused()
+                element, before = found
                 element.click()
                 return self._refused() == before
             except NOT_YET:
                 return False
 
-        if not wait_for(clicked, limit_s):
+        if not wait_for(clicked, limit_s, EVERY_S):
             raise AssertionError(
                 '{!r} cannot be clicked; the page says:\n{}'.format(selector, self.text()[:2000])
             )
@@ -107,12 +127,7 @@ class Browser:
         """Whether a click on an element would be taken as meant: the page refuses one that comes
         too soon after a change.
         """
-        return self.run(
-            'const it = arguments[0].closest("[data-deliberate]");'
-            'if (!it || it.hasAttribute("data-settled")) return true;'
-            'it.scrollIntoView({ block: "center" }); return false',
-            element,
-        )
+        return self.run(SETTLED + 'return settled(arguments[0])', element)
 
     def _refused(self):
         return self.run('return document.body.dataset.refused')
@@ -177,15 +192,12 @@ class Browser:
 
     def says(self, text, selector='body', limit_s=40.0):
         """Whether an element comes to hold a text."""
-        return bool(wait_for(lambda: text in self.text(selector), limit_s))
+        return bool(wait_for(lambda: text in self.text(selector), limit_s, EVERY_S))
 
     def text(self, selector='body'):
-        """Text of the first such element, '' where there is none."""
-        try:
-            elements = self.driver.find_elements(By.CSS_SELECTOR, selector)
-            return elements[0].text if elements else ''
-        except StaleElementReferenceException:
-            return ''
+        """The lines of text of the first such element, '' where none is shown."""
+        lines = self.run(TEXT, selector).splitlines()
+        return '\n'.join(' '.join(line.split()) for line in lines if line.strip())
 
     def texts(self, selector):
         """The text of each such element."""
@@ -221,17 +233,7 @@ class Browser:
         self.driver.save_screenshot(path)
 
     def _shown(self, selector):
-        try:
-            return next(
-                (
-                    element
-                    for element in self.driver.find_elements(By.CSS_SELECTOR, selector)
-                    if element.is_displayed()
-                ),
-                None,
-            )
-        except StaleElementReferenceException:
-            return None
+        return self.run(SHOWN + 'return shown', selector)
 
 
 def _below(process):

@@ -14,14 +14,14 @@ _BELIEVED_S = 0.15
 END_LIMIT_S = 2.0 + 1.0
 
 
-def wait_for(condition: Callable[[], Any], limit_s: float = 40.0) -> Any:
+def wait_for(condition: Callable[[], Any], limit_s: float = 40.0, every_s: float = 0.02) -> Any:
     """Poll until the condition holds, at most so many seconds; its last value."""
     until = time.monotonic() + limit_s
     while time.monotonic() < until:
         value = condition()
         if value:
             return value
-        time.sleep(0.02)
+        time.sleep(every_s)
     return condition()
 
 
