@@ -33,6 +33,10 @@ def main() -> int:
     arguments = parse_arguments()
     if arguments.upstream:
         sys.path.insert(0, arguments.upstream)
+    import smach
+
+    is_upstream = Path(smach.__file__).resolve().parents[1] != HERE.parent / 'src'
+    print('engine: {}'.format(smach.__file__))
     silence()
     threading.excepthook = lambda said: None  # of the branches of Concurrences
     seeds: List[Any] = (
@@ -42,7 +46,7 @@ def main() -> int:
     )
     counts: Counter[str] = collections.Counter()
     for seed in seeds:
-        try_tree(seed, bool(arguments.upstream), counts)
+        try_tree(seed, is_upstream, counts)
     for name in (
         'trees',
         'decisions',

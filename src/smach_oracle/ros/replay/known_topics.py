@@ -20,12 +20,12 @@ class KnownTopics:
         name: str,
     ) -> None:
         """
-        :param topics: resolved names.
+        :param topics: resolved names. One may stand there twice.
         :param types: the classes of messages by the names of their types.
         :param take: called with each message and its topic.
         :param name: of the thread that asks the master.
         """
-        self._topics = topics
+        self._topics = list(dict.fromkeys(topics))
         self._types = types
         self._take = take
         self._stopped = threading.Event()

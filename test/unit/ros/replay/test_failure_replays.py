@@ -1,6 +1,7 @@
 """The last seconds before a failure: bounded in memory, for the question and for the bag."""
 
 import random
+import threading
 from types import SimpleNamespace
 
 import numpy as np
@@ -263,6 +264,13 @@ def test_nodes_that_share_a_topic_of_joints_are_thinned_out_each_by_itself(robot
         robot.pass_time(0.1)
     names = [joints.name for joints in robot.ask().joints]
     assert names.count(['arm']) == names.count(['gripper']) == 10
+
+
+def test_a_topic_that_is_named_twice_is_waited_for_once(robot):
+    """Or the thread that asks the master would never end."""
+    robot.keep(ReplaySettings((EYE, HAND, EYE), ()))
+    names = ('replay cameras', 'replay joints')
+    assert wait_for(lambda: not any(each.name in names for each in threading.enumerate()))
 
 
 def test_a_robot_without_cameras_and_joints_keeps_nothing(monkeypatch):
