@@ -19,7 +19,7 @@ from smach_oracle.oracle.decision.learned import (
     _Gain,
 )
 from smach_oracle.oracle.decision.policies import policy_named
-from smach_oracle.oracle.decision.policy import Menu, Past, Preconditions, Situation
+from smach_oracle.oracle.decision.policy import Menu, Past, Policy, Preconditions, Situation
 from smach_oracle.oracle.decision.ways import (
     BY_PERSON,
     FIRST,
@@ -315,6 +315,42 @@ def test_without_exploring_nothing_is_drawn():
 def test_the_control_tells_the_chance_of_its_choice():
     choice = policy_named('any_way').choose(situation([]))
     assert choice.chance == pytest.approx(1.0 / len(choice.ways))
+
+
+@pytest.mark.parametrize('explore', [0.0, 0.25])
+def test_the_chance_of_a_way_is_that_of_being_first(explore):
+    policy, given = policy_named('escalating', {'explore': explore}), situation([])
+    first, second, third = keys(policy.order(given))
+    chances = [policy.chance_of(given, key) for key in (first, second, third, '', 'no such way')]
+    assert chances == pytest.approx([1.0 - explore, explore, 0.0, 0.0, 0.0])
+    one, none = situation([], (AGAIN,)), situation([], ())
+    assert [policy.chance_of(one, key) for key in (AGAIN.key, BACK.key, '')] == [1.0, 0.0, 0.0]
+    assert [policy.chance_of(none, key) for key in (AGAIN.key, '')] == [0.0, 1.0]
+
+
+def test_each_way_of_the_control_is_as_likely_to_be_first():
+    policy = policy_named('any_way')
+    ways = situation([])
+    chances = [policy.chance_of(ways, key) for key in (AGAIN.key, BACK.key, FAR.key, '')]
+    assert chances == pytest.approx([1 / 3, 1 / 3, 1 / 3, 0.0])
+    assert policy.chance_of(situation([], ()), '') == 1.0
+
+
+class ByReach(Policy):
+    """Goes the ways of the menu as they stand there."""
+
+    goes_by_ways = True
+
+    def order(self, situation: Situation) -> Sequence[Way]:
+        return situation.menu.ways
+
+
+def test_a_policy_that_only_orders_the_ways_goes_the_first_one():
+    policy, given = ByReach(), situation([])
+    choice = policy.choose(given)
+    assert (keys(choice.ways), choice.chance) == (keys((AGAIN, BACK, FAR)), 1.0)
+    assert [policy.chance_of(given, key) for key in (AGAIN.key, BACK.key, '')] == [1.0, 0.0, 0.0]
+    assert policy.chance_of(situation([], ()), '') == 1.0
 
 
 # -- in machines

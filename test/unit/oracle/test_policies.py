@@ -15,7 +15,7 @@ from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede, w
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policies import POLICIES, policy_named
-from smach_oracle.oracle.decision.policy import FailureContext, Preconditions, Situation
+from smach_oracle.oracle.decision.policy import FailureContext, Past, Preconditions, Situation
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.history import History
@@ -430,3 +430,21 @@ def test_what_earlier_versions_have_told_of_a_history_is_read():
     assert history.failing_since('S', 0)
     assert not history.context_since('S', 'INIT', 0).failed_last
     assert history.succeeded_before('S', 0) == 'A'
+
+
+@pytest.mark.parametrize(
+    ('name', 'spent', 'why'),
+    [
+        ('retry', 2, 'its 2 retries are spent'),
+        ('step_back', 2, 'its 2 steps back are spent'),
+        ('ladder', 4, 'its 1 retry and 3 steps back are spent'),
+    ],
+)
+def test_a_baseline_says_why_it_ends_once_it_does(name, spent, why):
+    def situation(recoveries):
+        past = Past(recoveries=recoveries)
+        return Situation(FailureClass.LOW, Preconditions.NONE, False, past)
+
+    policy = policy_named(name)
+    assert [policy.why(situation(before)) for before in range(spent)] == [''] * spent
+    assert policy.why(situation(spent)) == why

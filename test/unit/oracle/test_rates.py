@@ -147,6 +147,12 @@ def test_what_is_no_snapshot_is_refused(learned):
         FailureRate(3, 0.1).restore(learned)
 
 
+@pytest.mark.parametrize('rate', [-0.1, 1.1, 'x', True, None])
+def test_a_rate_that_is_none_is_refused(rate):
+    with pytest.raises(ValueError, match='rate: .* is not from 0 to 1'):
+        make_estimator('exponential', 3, 0.1).restore({'estimator': 'exponential', 'rate': rate})
+
+
 def test_states_learn_apart_by_their_own_memory_and_thresholds():
     machine = watched(
         Scripted('aborted'),
@@ -358,6 +364,11 @@ def test_rates_can_be_saved_and_loaded_by_hand(tmp_path):
     twin = OracleContainer.wrap(chain_of(Scripted()))
     twin.load_rates(str(tmp_path / 'by_hand.json'))
     assert twin.rates()[0].failures == 1
+    machine.execute()
+    machine.save_rates(str(tmp_path / 'by_hand.json'))
+    twin.load_rates(str(tmp_path / 'by_hand.json'))
+    (row,) = twin.rates()
+    assert (row.successes, row.failures) == (2, 1), 'what it has learned itself is replaced'
     with pytest.raises(OSError):
         machine.save_rates(str(tmp_path / 'no' / 'folder.json'))
 

@@ -56,6 +56,15 @@ def test_two_objects_of_one_machine_add_what_each_has_learned(tmp_path, settings
     assert single.rate('A').rate == pytest.approx(two.rate('A').rate)
 
 
+def test_of_another_estimator_the_totals_alone_are_added():
+    own, theirs = (ESTIMATORS[kind](5, 0.2) for kind in ('exponential', 'window'))
+    for failed in (True, False, False):
+        own.add(failed)
+        theirs.add(failed)
+    found = merged(own.snapshot(), {}, theirs.snapshot(), 5)
+    assert found == dict(own.snapshot(), successes=4, failures=2)
+
+
 def test_a_machine_under_another_name_goes_on_with_what_was_learned(tmp_path):
     path = tmp_path / 'rates.json'
     machine(path, 'OLD', ['aborted', 'aborted']).run()

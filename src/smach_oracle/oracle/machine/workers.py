@@ -8,12 +8,12 @@ While an abandoned thread lives, what it runs is blocked: nobody enters it again
 import contextlib
 import functools
 import threading
-from typing import Callable, Dict, List, NamedTuple, Optional
+from typing import Callable, Dict, List, NamedTuple, Optional, Tuple, Type
 
 import smach
 from smach_common.foreign import repr_of
 
-from ..identity import attribute_of
+from ..identity import attribute_of, own_attributes, own_mark
 from ..scope.background_call import BackgroundCall, KeptThread
 from ..scope.clock import Clock
 from ..scope.scope import CallEnd, Reason, Scope, inside
@@ -22,6 +22,7 @@ from ..smach_private import mark_of, set_executing
 from .userdata import UserdataGate
 
 _FUNCTION = 'smach_oracle function'  # name of its thread
+_RECALL = 'recall_preempt'
 _LATE = 'still runs since it overran its time limit'
 _STOPPED = 'still runs since a preempt or a shutdown'
 
@@ -103,7 +104,7 @@ class Workers:
             if call.was_left_behind:
                 self._block(state, call, _LATE)
                 run.cancel(Reason.LEFT_BEHIND)
-                _stop_bare_machines(state)
+                _leave_behind(state, call)
             elif end is CallEnd.BY_ITSELF:
                 self.under_way.pop(id(state), None)
             else:
@@ -180,13 +181,41 @@ def request_preempt(state: Optional[smach.State]) -> None:
         smach.logerr('request_preempt of {} failed: {}'.format(repr_of(state), repr_of(err)))
 
 
-def _stop_bare_machines(state: smach.State) -> None:
-    """Let machines without an oracle end at their next state boundary, as both engines do then."""
+class _KeptRequest:
+    """Stands in place of the `recall_preempt` of a state that was left behind, as long as it runs.
+
+    So nobody takes its request back: no engine at the end of a container, no action server for the
+    goal before. A copy of the state does not run.
+    """
+
+    def __init__(self, state: smach.State, call: Optional[BackgroundCall] = None) -> None:
+        self._state = state
+        self._call = call
+
+    def __call__(self) -> None:
+        if self._call is None or self._call.done.is_set():
+            own_attributes(self._state).pop(_RECALL, None)
+            self._state.recall_preempt()
+
+    def __reduce__(self) -> Tuple[Type['_KeptRequest'], Tuple[smach.State]]:
+        return _KeptRequest, (self._state,)
+
+
+def _leave_behind(state: smach.State, call: BackgroundCall) -> None:
+    """Have the request to a state that still runs stand, and to all that it contains.
+
+    Machines in it without an oracle end at their next state boundary, as both engines do then.
+    """
+    kept = own_mark(state, _RECALL)
+    if kept is None or isinstance(kept, _KeptRequest):
+        own_attributes(state)[_RECALL] = _KeptRequest(state, call)
     try:
         if isinstance(state, smach.StateMachine) and mark_of(state) is None:
             set_executing(state, False)
         for child in _children(state):
-            _stop_bare_machines(child)
+            # one that was left behind itself may run longer
+            if not isinstance(own_mark(child, _RECALL), _KeptRequest):
+                _leave_behind(child, call)
     except Exception as err:  # a user's container may be of any make
         smach.logwarn('Could not stop what is left of {}: {}'.format(repr_of(state), repr_of(err)))
 

@@ -1,0 +1,145 @@
+"""What adapters and operators ask of a machine, and tell it, from outside."""
+
+import pytest
+from held_machines import Gate, Held
+from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
+
+import smach
+from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.errors import SettingsError, TrialError
+from smach_oracle.oracle.operator_hand import OperatorHand
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.facts import told_in_words
+
+
+def warnings_in(log):
+    return [text for level, text in log if level == 'warn']
+
+
+def test_a_bare_machine_has_no_oracle_and_no_hand():
+    for make in (oracle_of, OperatorHand):
+        with pytest.raises(TrialError, match='is not under an oracle'):
+            make(chain_of(Scripted()))
+
+
+def test_a_machine_without_a_name_may_take_one():
+    machine = watched(Scripted('aborted'))
+    oracle = oracle_of(machine.machine)
+    assert (oracle.is_named, oracle.name) == (False, 'SM_ROOT')
+    oracle.take_name('task')
+    assert oracle.is_named
+    machine.run()
+    assert {event.path for event in machine.events} == {'task'}
+    assert oracle_of(OracleContainer.wrap(chain_of(Scripted()), name='other')).is_named
+    assert not oracle.is_parents
+
+
+def test_health_may_be_set_between_two_trials():
+    oracle = oracle_of(watched(Scripted()).machine)
+    assert oracle.health is None
+    oracle.health = print
+    assert oracle.health is print
+
+
+def test_a_state_is_asked_what_it_knows_of_its_failure():
+    state = Scripted('aborted', 'aborted')
+    machine = watched(state)
+    oracle = oracle_of(machine.machine)
+    assert oracle.describe_failure(state) == ''
+    oracle.describe_failure = lambda failed: 'the gripper is empty' if failed is state else ''
+    machine.run()
+    assert machine.of(EventKind.FAILURE)[0].text == 'the gripper is empty'
+
+
+class Deaf(smach.StateMachine):
+    """A user's machine that cannot be preempted."""
+
+    def request_preempt(self):
+        raise OSError('the line is dead')
+
+
+def test_a_machine_whose_own_preempt_fails_says_so_to_the_operator():
+    gate = Gate()
+    with Held(chain_of(Scripted(gate), machine_class=Deaf)).begin() as held:
+        assert gate.entered.wait(20)
+        assert held.hand.preempt('eva') == (
+            "SM_ROOT is asked to stop, and its request_preempt failed: OSError('the line is dead')"
+        )
+        gate.opened.set()
+        assert held.end() == 'done'
+
+
+def test_a_viewer_that_hears_no_answer_is_refused_in_the_log(log):
+    gate, last = Gate(), Scripted()
+    with Held(chain_of(Scripted(gate), last)).begin() as held:
+        assert gate.entered.wait(20)
+        assert not held.hand.send('NOWHERE', '')
+        assert held.hand.send('B', 'viewer')
+        gate.opened.set()
+        assert held.end() == 'done'
+    (refused,) = warnings_in(log)
+    assert 'is not sent to NOWHERE as a viewer wants: ' in refused
+
+
+def test_a_state_in_which_a_viewer_has_a_machine_begin_is_asked_about():
+    """Its author leads to INNER again. Between the two, a viewer has it begin in B."""
+    pour = Scripted()
+    inner = chain_of(Scripted(), pour)
+
+    def viewer(state, ud):
+        OperatorHand(inner).begins_in('B')
+        inner.set_initial_state(['B'])
+        return 'again'
+
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('INNER', inner, {'done': 'LOOK'})
+        look = Scripted(viewer, outcomes=('ok', 'again', 'aborted'))
+        smach.StateMachine.add('LOOK', look, {'again': 'INNER', 'ok': 'done'})
+    expert = FakeExpert(goto('LOOK', container='SM_ROOT'))
+    machine = Watched(
+        machine, expert=expert, settings={'states': {'INNER/B': {'on_retry': 'confirm'}}}
+    )
+    assert machine.run() == 'done'
+    assert (pour.runs, [question.failed_state for question in expert.questions]) == (1, ['B'])
+
+
+def test_the_data_of_an_event_that_is_none_tell_nothing():
+    assert told_in_words(None) == {}
+    assert told_in_words({'jumped_to': 3, 'decided_by': 'policy', 'other': 'x'}) == {
+        'decided_by': 'policy'
+    }
+
+
+def test_what_cannot_be_wrapped_stays_bare():
+    inner, machine = chain_of(Scripted()), chain_of(Scripted())
+    with machine:
+        smach.StateMachine.add('INNER', inner)
+    smach.StateMachine.set_initial_state(machine, ['A'])
+    before = type(machine), type(inner), set(vars(machine))
+    with pytest.raises(SettingsError, match='nested'):
+        OracleContainer.wrap(machine, settings={'nested': ['NO/SUCH']})
+    assert (type(machine), type(inner), set(vars(machine))) == before
+    assert machine.execute() == 'done'
+
+
+def test_a_state_that_is_not_there_is_complained_of_to_a_function():
+    complaints = []
+    OracleContainer.wrap(
+        chain_of(Scripted()),
+        settings={'on_no_answer': 'goto:NOWHERE', 'on_resume': 'state:GONE'},
+        strict=complaints.append,
+    )
+    assert [(each.error.key, each.name) for each in complaints] == [
+        ('expert.on_no_answer', 'NOWHERE'),
+        ('checkpoint.on_resume', 'GONE'),
+    ]
+
+
+def test_a_plain_success_is_told_to_who_registered_for_transitions():
+    told = []
+    machine = watched(Scripted(), Scripted(), Scripted())
+    machine.machine.register_transition_cb(lambda userdata, active: told.append([*active]))
+    for _ in range(3):  # from the second time on each takes the short way
+        assert machine.run() == 'done'
+    assert told == [['B'], ['C']] * 3
