@@ -31,7 +31,7 @@ UNDER_CAN = MapBox(np.array([0.85, 0.0, 0.70]), np.array([0.35, 0.7, 0.02]), 0.0
 
 def after(seed, states):
     """The world after the first states of a trial without a cause."""
-    world = World(draw(seed, benign=True))
+    world = World(draw(seed, benign=True), binning=2)
     for _, work in DrinkRetrievalRehearsal(world).states[:states]:
         work()
     return world

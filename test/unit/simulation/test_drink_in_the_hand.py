@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kitchen_trial import in_kitchen
 
 from smach_oracle.msg import PickGoal
 from smach_oracle.pr2.nodes.kitchen_skills import FRIDGE
@@ -15,7 +16,7 @@ from smach_oracle.simulation.scenes.kitchen_scene import draw
 
 def before_the_shelf(scene):
     """A world, and a trial in it whose drink has been detected."""
-    world = World(scene)
+    world = World(scene, binning=2)
     trial = DrinkRetrievalRehearsal(world)
     for _, work in trial.states[:5]:
         work()
@@ -68,25 +69,27 @@ def test_a_drink_that_creeps_between_the_fingers_is_not_lost_on_the_way_out():
 
 
 def test_a_drink_that_was_grasped_with_an_inclined_hand_is_carried_upright():
-    world, trial = before_the_shelf(draw(1, benign=True))
-    pick(trial, attempt=2)
-    tool = world.link_pose('r_gripper_tool_frame')
-    assert tool[2, 0] < -np.sin(0.3), 'the hand is inclined'
-    assert world.holding('drink_0') and tilt(world, 'drink_0') < 12.0
-    world.close()
+    def upright(world, trial):
+        pick(trial, attempt=2)
+        tool = world.link_pose('r_gripper_tool_frame')
+        assert tool[2, 0] < -np.sin(0.3), 'the hand is inclined'
+        assert world.holding('drink_0') and tilt(world, 'drink_0') < 12.0
+
+    in_kitchen(1, 5, upright)
 
 
 def test_on_a_level_way_the_hand_hardly_tilts():
-    world, trial = before_the_shelf(draw(1, benign=True))
-    pick(trial, attempt=0)
-    with Arm(trial.skills.context, 'right', {}, 1) as limb:
-        above = limb.pose()
-        above[:3, 3] += (0.10, 0.30, 0.10)
-        way = limb.level_path(limb.reach(above, near=limb.now())[0])
-        upright = limb.pose()[2, :3]
-        tilts = [np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in way]
-    assert max(tilts) <= TILT + 1e-6
-    world.close()
+    def level(world, trial):
+        pick(trial, attempt=0)
+        with Arm(trial.skills.context, 'right', {}, 1) as limb:
+            above = limb.pose()
+            above[:3, 3] += (0.10, 0.30, 0.10)
+            way = limb.level_path(limb.reach(above, near=limb.now())[0])
+            upright = limb.pose()[2, :3]
+            tilts = [np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in way]
+        assert max(tilts) <= TILT + 1e-6
+
+    in_kitchen(1, 5, level)
 
 
 def test_a_drink_is_reached_by_pushing_its_neighbour_once_no_other_grasp_is_left():

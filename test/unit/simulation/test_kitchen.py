@@ -7,8 +7,8 @@ import itertools
 
 import numpy as np
 import pytest
-from forked import in_a_fork
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
+from kitchen_trial import in_kitchen
 from std_msgs.msg import Header
 from support.stopped_robot import stopped_after
 
@@ -214,62 +214,12 @@ def next_of(machine, label):
     )
 
 
-def begun(end):
-    """A world and a trial in it that has come to a state, given by its place in the list."""
-    world = World(draw(1, benign=True))
-    trial = drink_rehearsal.DrinkRetrievalRehearsal(world)
-    for _, work in trial.states[:end]:
-        work()
-    return world, trial
-
-
-@pytest.fixture(scope='module')
-def before_the_hand_over():
-    world, trial = begun(-1)
-    yield world, trial
-    world.close()
-
-
-@pytest.fixture(scope='module')
-def before_the_pick():
-    world, trial = begun(5)
-    yield world, trial
-    world.close()
-
-
-@pytest.mark.parametrize('motions', [4, 11, 99])
-def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(
-    before_the_hand_over, motions
-):
-    """99: it had ended, and nobody was told."""
-    world, trial = before_the_hand_over
-    hand_over = trial.states[-1][1]
-
-    def stopped_and_ended():
-        stopped_after(trial.robot, motions)
-        if motions < 99:
-            with pytest.raises(SkillError, match='told to stop'):
-                hand_over()
-        else:
-            hand_over()
-        hand_over()
-        world.step(60)
-        assert judge(world, world.scene.goal).success
-        if motions == 99:  # it has been taken from the palm
-            world.reset(world.scene)
-            with pytest.raises(SkillError):
-                hand_over()
-
-    in_a_fork(stopped_and_ended)
-
-
 @pytest.mark.parametrize('motions', [3, 5, 7, 99])
-def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(before_the_pick, motions):
+def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(motions):
     """99: it had ended, and nobody was told."""
-    world, trial = before_the_pick
-    pick, do = trial.states[5][1], trial.robot._do
 
-    def stopped_and_ended():
+    def stopped_and_ended(world, trial):
+        pick, do = trial.states[5][1], trial.robot._do
         stopped_after(trial.robot, motions, for_good=True)
         if motions < 99:
             with pytest.raises((RobotError, SkillError), match='told to stop'):
@@ -284,21 +234,54 @@ def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(before_the_
         world.step(60)
         assert judge(world, world.scene.goal).success
 
-    in_a_fork(stopped_and_ended)
+    in_kitchen(1, 5, stopped_and_ended)
 
 
-def test_the_closed_door_is_opened_by_contact_alone_and_the_base_stands_clear_of_it():
-    world = World(draw(3, benign=True))
-    for _, work in drink_rehearsal.DrinkRetrievalRehearsal(world).states[:3]:
-        work()
-    assert world.body_joint('fridge', DOOR_JOINT) > np.radians(85.0)
-    assert not [contact for contact in world.contacts('fridge') if contact.other == 'robot']
-    world.close()
+def test_a_robot_that_held_something_when_its_last_trial_ended_does_the_next_one_as_ever():
+    """The hand that has opened the refrigerator stands half open then, with nothing in it."""
+
+    def everything(world):
+        poses = [world.body_pose(name).tobytes() for name in world.body_names]
+        return world.periods, sorted(world.joints().items()), poses
+
+    def done_again(world, trial):
+        assert world.holding('drink_0') == 'right'
+        first = everything(world)
+        world.reset(world.scene)
+        trial.begin()
+        for _, work in trial.states[:6]:
+            work()
+        assert everything(world) == first
+
+    in_kitchen(1, 6, done_again)
+
+
+@pytest.mark.parametrize('motions', [4, 11, 99])
+def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(motions):
+    """99: it had ended, and nobody was told."""
+
+    def stopped_and_ended(world, trial):
+        hand_over = trial.states[-1][1]
+        stopped_after(trial.robot, motions)
+        if motions < 99:
+            with pytest.raises(SkillError, match='told to stop'):
+                hand_over()
+        else:
+            hand_over()
+        hand_over()
+        world.step(60)
+        assert judge(world, world.scene.goal).success
+        if motions == 99:  # it has been taken from the palm
+            world.reset(world.scene)
+            with pytest.raises(SkillError):
+                hand_over()
+
+    in_kitchen(1, 9, stopped_and_ended)
 
 
 def off_after_a_look(degrees, wrong):
     """How far the robot's belief is off (4x4, m) after a look, with a localisation wrong before."""
-    world = World(door_at(degrees, base=(0.58, -0.05, 0.03)))
+    world = World(door_at(degrees, base=(0.58, -0.05, 0.03)), binning=2)
     robot = DirectRobot(world)
     robot.localise(world.true_base() @ wrong)
     skills = KitchenSkills(SkillContext(robot, installed_model()), Kitchen())
@@ -329,7 +312,7 @@ def test_a_door_that_hides_the_rest_of_the_fridge_does_not_lead_the_localisation
 
 
 def test_a_door_that_is_found_half_open_after_the_push_is_a_failure(monkeypatch):
-    world = World(door_at(60, base=(0.4, -0.1, 0.0)))
+    world = World(door_at(60, base=(0.4, -0.1, 0.0)), binning=2)
     monkeypatch.setattr(door, '_push_open', lambda *_: door.WIDE)  # the arm felt no resistance
     with pytest.raises(SkillError, match='the door stands open by (59|60|61) degrees only'):
         door.open_door(SkillContext(DirectRobot(world), installed_model()), Kitchen(), 'right')
@@ -337,7 +320,7 @@ def test_a_door_that_is_found_half_open_after_the_push_is_a_failure(monkeypatch)
 
 
 def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monkeypatch):
-    world = World(door_at(60, base=(0.4, -0.1, 0.0)))
+    world = World(door_at(60, base=(0.4, -0.1, 0.0)), binning=2)
     robot = DirectRobot(world)
 
     def fail(*_):
@@ -353,7 +336,7 @@ def test_after_a_failure_at_the_door_the_base_takes_the_hands_away_from_it(monke
 @pytest.mark.parametrize('hand', [(0.45, 0.28, 0.88), (0.60, -0.30, 1.0)])
 def test_a_hand_in_the_way_goes_to_its_side_before_the_other_shuts_the_door(hand):
     """As a person may leave it, who took the drink out."""
-    world = World(door_at(95, (0.68, -0.30, 0.0), seed=5))
+    world = World(door_at(95, (0.68, -0.30, 0.0), seed=5), binning=2)
     robot = DirectRobot(world)
     context = SkillContext(robot, installed_model())
     robot.torso(drink_rehearsal.TORSO_HEIGHT)
@@ -366,7 +349,7 @@ def test_a_hand_in_the_way_goes_to_its_side_before_the_other_shuts_the_door(hand
 
 
 def test_what_a_person_put_into_a_hand_that_is_not_level_stays_upright():
-    world = World(door_at(95, (0.68, -0.30, 0.0), seed=5))
+    world = World(door_at(95, (0.68, -0.30, 0.0), seed=5), binning=2)
     context = SkillContext(DirectRobot(world), installed_model())
     with Arm(context, 'right', {}, 1) as limb:
         limb.go(limb.reach(from_rpy((0.55, -0.20, 0.95), pitch=0.3, yaw=0.5))[0])

@@ -17,9 +17,9 @@ class WatchedWorld(World):
     it.
     """
 
-    def __init__(self):
+    def __init__(self, binning):
         self.touched = set()
-        super().__init__()
+        super().__init__(binning=binning)
 
     def step(self, count=1):
         for _ in range(count):
@@ -30,15 +30,15 @@ class WatchedWorld(World):
 
 
 @pytest.mark.parametrize(
-    'task, draw, seed, expected',
+    'task, draw, seed, binning, expected',
     [
-        (PickAndPlaceRehearsal, tabletop_scene.draw, 4, {'object_0'}),
-        (PickAndPlaceRehearsal, tabletop_scene.draw, 9, {'object_0'}),
-        (DrinkRetrievalRehearsal, kitchen_scene.draw, 3, {'fridge', 'drink_0'}),
+        (PickAndPlaceRehearsal, tabletop_scene.draw, 4, 1, {'object_0'}),
+        (PickAndPlaceRehearsal, tabletop_scene.draw, 9, 2, {'object_0'}),
+        (DrinkRetrievalRehearsal, kitchen_scene.draw, 3, 1, {'fridge', 'drink_0'}),
     ],
 )
-def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, expected):
-    world = WatchedWorld()
+def test_the_robot_touches_what_it_takes_and_nothing_else(task, draw, seed, binning, expected):
+    world = WatchedWorld(binning)
     done = rehearse(draw(seed, benign=True), world, task)
     assert done.success, (done.failed, done.reason, done.why)
     assert len(world.movable()) > 1 and world.touched == expected

@@ -36,36 +36,12 @@ def seed_with(draw, kind):
 )
 def test_the_same_seed_gives_the_same_trial_also_after_another_one(task, draw, kind, failed):
     scene = draw(seed_with(draw, kind))
-    world = World()
+    world = World(binning=2)
     first = course(world, scene, task)
     world.close()
-    world = World()
+    world = World(binning=2)
     other = course(world, tabletop_scene.draw(1, benign=True), PickAndPlaceRehearsal)
     again = course(world, scene, task)
     world.close()
     assert first[0].failed == failed and first[0].reason
     assert again == first != other
-
-
-def done_so_far(world, trial, states):
-    """Where everything is after the first states of a trial, and how long they took."""
-    world.reset(kitchen_scene.draw(1, benign=True))
-    trial.begin()
-    begun = world.periods
-    for _, work in trial.states[:states]:
-        work()
-    return (
-        world.periods - begun,
-        sorted(world.joints().items()),
-        [world.body_pose(name).tobytes() for name in world.body_names],
-    )
-
-
-def test_a_robot_that_held_something_when_its_last_trial_ended_does_the_next_one_as_ever():
-    """The hand that has opened the refrigerator stands half open then, with nothing in it."""
-    world = World(binning=2)
-    trial = DrinkRetrievalRehearsal(world)
-    first = done_so_far(world, trial, 6)
-    assert world.holding('drink_0') == 'right'
-    assert done_so_far(world, trial, 6) == first
-    world.close()
