@@ -23,7 +23,7 @@ PUT = StatePlan('put_down', place='place_pose')
 
 @pytest.fixture(scope='module', name='world')
 def make_world():
-    world = World()
+    world = World(binning=2)
     yield world
     world.close()
 

@@ -23,7 +23,7 @@ PALM = np.array([0.62, 0.0, 0.85])
 
 @pytest.fixture(scope='module', name='world')
 def make_world():
-    world = World()
+    world = World(binning=2)
     yield world
     world.close()
 

@@ -27,7 +27,7 @@ from smach_oracle.simulation.scenes.tabletop_scene import GOAL, TABLE_TOP, draw
 
 @pytest.fixture(scope='module', name='world')
 def make_world():
-    world = World()
+    world = World(binning=2)
     yield world
     world.close()
 

@@ -6,8 +6,7 @@ import numpy as np
 
 from smach_oracle.geometry.camera_image import CameraImage
 from smach_oracle.geometry.transforms import inverse
-from smach_oracle.pr2.robot import CAMERA_FRAME
-from smach_oracle.simulation.physics.camera import RenderedView, see, size_of
+from smach_oracle.simulation.physics.camera import see
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.scene import Body, CameraQuality, Goal, RobotStart, Scene
@@ -90,7 +89,7 @@ def look(
     )
     DirectRobot(world).look_at(at)
     image = see(world)
-    shown = RenderedView(world, world.link_pose(CAMERA_FRAME), size_of(world)).bodies
+    shown = world.labels
     names = np.array([world.seen_as(index) for index in range(shown.max() + 1)] + [''])
     base = inverse(world.true_base())
     return Look(

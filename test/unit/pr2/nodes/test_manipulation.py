@@ -53,7 +53,7 @@ class Bench:
     """A world and the skills in it, with a map of what stands on the table."""
 
     def __init__(self, *bodies, **more):
-        self.world = World(scene(*bodies, **more))
+        self.world = World(scene(*bodies, **more), binning=2)
         self.robot = DirectRobot(self.world)
         self.skills = Manipulation(SkillContext(self.robot, installed_model()))
 

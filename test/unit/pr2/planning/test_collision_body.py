@@ -1,9 +1,12 @@
 """The robot of collision checks is loaded once and lent again; an answer shows nothing of that."""
 
+from functools import partial
+
 import numpy as np
 import pybullet
 import pytest
 from arms import REST, clutter, model
+from forked import in_a_fork
 
 from smach_oracle.pr2.planning import collision, collision_body
 from smach_oracle.pr2.planning.collision import CollisionWorld
@@ -59,15 +62,16 @@ def test_a_robot_that_was_lent_before_answers_as_a_new_one(loads, monkeypatch):
     assert answers(1) == new and loads == ['right', 'right']
 
 
-def touches(*way):
-    """What the right arm touches of the robot itself at each of these joint positions."""
-    found = []
+def touches(q):
+    """What the right arm touches of the robot itself at these joint positions."""
     with CollisionWorld(model(), 'right', REST) as space:
-        for q in way:
-            space.is_free(q)
-            points = pybullet.getContactPoints(physicsClientId=space._client)
-            found.append(sorted((point[3], point[4], point[8]) for point in points))
-    return found
+        return touched(space, q)
+
+
+def touched(space, q):
+    space.is_free(q)
+    points = pybullet.getContactPoints(physicsClientId=space._client)
+    return sorted((point[3], point[4], point[8]) for point in points)
 
 
 def test_contacts_of_before_are_forgotten(loads, monkeypatch):
@@ -76,12 +80,12 @@ def test_contacts_of_before_are_forgotten(loads, monkeypatch):
         drawn = [space.chain.random(generator, 1)[0] for _ in range(300)]
         inside = [q for q in drawn if not space.is_free(q)]
     assert len(inside) > 30
-    new = []
-    for q in inside:
-        monkeypatch.setattr(collision, '_POOL', BodyPool())
-        new.append(touches(q + 0.005))
+    monkeypatch.setattr(collision, '_POOL', BodyPool())
+    with CollisionWorld(model(), 'right', REST) as space:  # a robot that nobody had before
+        new = [in_a_fork(partial(touched, space, q + 0.005)) for q in inside]
+    for q, as_new in zip(inside, new):
         touches(q)
-        assert touches(q + 0.005) == new[-1]
+        assert touches(q + 0.005) == as_new
     monkeypatch.setattr(CollisionBody, 'clean', lambda self: None)
     kept = []
     for q in inside:
