@@ -79,7 +79,8 @@ def _service(name: str, task: str = TASKS[0], with_lab: bool = False) -> Callabl
         node._settings = dataclasses.replace(SETTINGS, task=task)
         node._lab = Lab(LabRun(3, 0.5), None, node._settings) if with_lab else None
         kept = node._recognition._views.copy()
-        with fake_ros(), mock.patch.object(reveal, 'RenderedView', made.view):
+        still = mock.patch.object(node._world, 'step')
+        with fake_ros(), mock.patch.object(reveal, 'RenderedView', made.view), still:
             try:
                 reply = as_bytes(made.offered.services['world/' + name](request))
             except rospy.ServiceException as err:
