@@ -1,15 +1,14 @@
 """Groups of settings: flat and in groups they are the same, and what is wrong is told clearly."""
 
 import pytest
-from drawn_settings import IN_GROUPS, drawn_settings, taken
-from hypothesis import HealthCheck, given, settings
+from drawn_settings import IN_GROUPS, QUICK, drawn_settings, taken
+from hypothesis import given, settings
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.execution.origin import origin_of
 from smach_oracle.oracle.settings.settings import GROUPS, Settings, StateSettings
 
 MOST_AT_THE_TOP = 28
-QUICK = {'deadline': None, 'suppress_health_check': list(HealthCheck)}
 STORE = {
     'checkpoint': '/var/lib/robot.db',
     'checkpoint_wait_s': 3.0,

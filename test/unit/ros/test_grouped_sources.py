@@ -6,16 +6,14 @@ import sys
 
 import pytest
 from borders.settings import parameters_are
-from drawn_settings import drawn_settings, taken
-from hypothesis import HealthCheck, given, settings
+from drawn_settings import QUICK, drawn_settings, taken
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.settings import GROUPS, Settings
 from smach_oracle.ros.loaded_settings import LoadedSettings, in_groups, load_settings
 from smach_oracle.ros.log.said_once import warn_once
-
-QUICK = {'deadline': None, 'suppress_health_check': list(HealthCheck)}
 
 
 @pytest.fixture

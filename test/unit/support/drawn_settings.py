@@ -1,13 +1,22 @@
 """Right settings, drawn at random, some of them under their older keys."""
 
+import functools
 from typing import Any, Dict, FrozenSet, NamedTuple, Optional
 
 from borders.setting_values import BY_NAME
+from hypothesis import HealthCheck, Phase
 from hypothesis import strategies as st
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.settings import GROUPS, Settings
 
+# each example is drawn by itself. Without its own phases hypothesis makes every second one of those
+# before it, ever smaller, for a score that no test here keeps
+QUICK = {
+    'deadline': None,
+    'suppress_health_check': list(HealthCheck),
+    'phases': [Phase.explicit, Phase.generate, Phase.shrink],
+}
 IN_GROUPS = sorted(name for group in GROUPS.texts for name in GROUPS.members(group))
 
 
@@ -38,6 +47,7 @@ class Drawn(NamedTuple):
         return found
 
 
+@functools.lru_cache(maxsize=None)
 def _right(name: str) -> Any:
     # an empty mapping is an empty group, but no condition
     return BY_NAME[name].filter(lambda value: value != {} and taken({name: value}) is not None)
