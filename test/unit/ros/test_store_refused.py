@@ -43,21 +43,28 @@ def obey_modes():
 
 
 @pytest.fixture
-def run(tmp_path):
+def run(tmp_path, warm_python):
     """Run a script under oracle_run with a store; returns exit code, output and errors."""
 
     def run_script(store, text=EXECUTES, options=(), before=None):
         (tmp_path / 'task.py').write_text(SCRIPT.replace('WORK', text))
-        done = subprocess.run(
-            [sys.executable, '-c', RUNNER, '--checkpoint', str(store), *options, 'task.py'],
-            cwd=str(tmp_path),
-            timeout=60,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=dict(os.environ, ROS_MASTER_URI='http://localhost:1'),
-            universal_newlines=True,
-            preexec_fn=before,
-        )
+        command = ['-c', RUNNER, '--checkpoint', str(store), *options, 'task.py']
+        how = {
+            'cwd': str(tmp_path),
+            'timeout': 60,
+            'env': dict(os.environ, ROS_MASTER_URI='http://localhost:1'),
+        }
+        if before is None:
+            done = warm_python.run(command, **how)
+        else:
+            done = subprocess.run(
+                [sys.executable, *command],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                universal_newlines=True,
+                preexec_fn=before,
+                **how,
+            )
         return done.returncode, done.stdout, done.stderr
 
     return run_script
