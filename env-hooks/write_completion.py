@@ -4,50 +4,67 @@ smach_oracle COMMAND`.
 Run it in the environment of scripts/ros_env when an option has changed.
 """
 
+import argparse
+import importlib
 import json
-import subprocess
+import os
+import runpy
 import sys
 import textwrap
-from concurrent.futures import ThreadPoolExecutor
+import traceback
 from pathlib import Path
 from typing import Any, Dict, List, Tuple
 
 HERE = Path(__file__).resolve().parent
 SCRIPTS = HERE.parent / 'scripts'
 TARGET = HERE / '60.completion_words.bash'
-# runs a command up to its parser, and prints what that knows
-ASK = """
-import argparse, json, runpy, sys
+# most of the time of a command up to its parser, where each has to import them
+IMPORTED_FIRST = ('rospy', 'numpy', 'yaml', 'smach', 'smach_oracle')
 
-def known(parser):
-    found = {'options': {}, 'works': {}}
+
+def known_to(parser: argparse.ArgumentParser) -> Dict[str, Any]:
+    """The options and works that a parser knows."""
+    found: Dict[str, Any] = {'options': {}, 'works': {}}
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            found['works'] = {name: known(below) for name, below in action.choices.items()}
+            found['works'] = {name: known_to(below) for name, below in action.choices.items()}
         elif action.help != argparse.SUPPRESS:
             for name in action.option_strings:
                 found['options'][name] = [str(each) for each in action.choices or ()]
     return found
 
-def told(parser, *args, **kwargs):
-    print(json.dumps(known(parser)))
-    raise SystemExit(0)
 
-argparse.ArgumentParser.parse_args = argparse.ArgumentParser.parse_known_args = told
-sys.argv[:] = [*sys.argv[1:], 'x']
-runpy.run_path(sys.argv[0], run_name='__main__')
-"""
+def run_up_to_parser(tell: int, command: List[str]) -> None:
+    """In a child: run a command up to its parser, and write what that knows."""
+
+    def told(parser: argparse.ArgumentParser, *_: Any, **__: Any) -> None:
+        os.write(tell, json.dumps(known_to(parser)).encode())
+        os._exit(0)
+
+    parser = argparse.ArgumentParser
+    setattr(parser, 'parse_args', told)
+    setattr(parser, 'parse_known_args', told)
+    sys.argv[:] = [*command, 'x']
+    sys.path[0] = os.path.dirname(command[0])
+    runpy.run_path(command[0], run_name='__main__')
 
 
 def ask(script: Path, *work: str) -> Dict[str, Any]:
     """The options and works that the parser of a command, or of one of its works, knows."""
-    told = subprocess.run(
-        [sys.executable, '-c', ASK, str(script), *work],
-        stdout=subprocess.PIPE,
-        check=True,
-        timeout=120,
-    ).stdout
-    found: Dict[str, Any] = json.loads(told.decode().splitlines()[-1])
+    reading, writing = os.pipe()
+    child = os.fork()
+    if not child:
+        try:
+            run_up_to_parser(writing, [str(script), *work])
+        except BaseException:
+            traceback.print_exc()
+        os._exit(1)  # it has come to no parser
+    os.close(writing)
+    with os.fdopen(reading, 'rb') as stream:
+        told = stream.read()
+    if os.waitpid(child, 0)[1]:
+        raise RuntimeError('{} comes to no parser'.format(script))
+    found: Dict[str, Any] = json.loads(told.decode())
     for name, below in found['works'].items():
         if not below['options']:  # the command loads no work before it is named
             found['works'][name] = ask(script, *work, name)
@@ -85,8 +102,9 @@ def text() -> str:
         for path in sorted(SCRIPTS.iterdir())
         if path.is_file() and _is_offered(path.read_bytes())
     ]
-    with ThreadPoolExecutor(2) as pool:
-        found = list(pool.map(ask, scripts))
+    for name in IMPORTED_FIRST:
+        importlib.import_module(name)
+    found = [ask(script) for script in scripts]
     cases = [line for script, known in zip(scripts, found) for line in lines_of(script.name, known)]
     table = ''.join(
         "    '{}')\n      echo '{}' ;;\n".format(key, folded(words)) for key, words in cases
