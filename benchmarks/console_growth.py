@@ -38,6 +38,8 @@ def main():
     class GrowthPage(ConsolePage):
         """The page that is worn."""
 
+        whole_browser = True
+
     told = quieted()
     with Processes() as processes:
         processes.start_master()

@@ -79,6 +79,8 @@ def draw_kitchen(_processes, folder):
     class KitchenPage(ConsolePage):
         """The page of which pictures are taken."""
 
+        whole_browser = True
+
     rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
     rospy.set_param('/alpha/reason', REASON)
     parts = publish_health()
@@ -108,6 +110,8 @@ def record_answer(_processes, folder):
 
     class RecordedPage(ConsolePage):
         """The page that is recorded."""
+
+        whole_browser = True
 
     rospy.init_node('draw_console', disable_signals=True, log_level=rospy.WARN)
     rospy.set_param('/alpha/reason', REASON)
@@ -241,6 +245,8 @@ def draw_pr2(processes, folder):
 
     class RobotPage(ConsolePage):
         """The page of which pictures are taken, beside the simulated PR2."""
+
+        whole_browser = True
 
         @classmethod
         def start_robot(cls, robot, *arguments):

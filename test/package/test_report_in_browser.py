@@ -29,7 +29,7 @@ return [...document.querySelectorAll(arguments[0])]
 @pytest.fixture(scope='module')
 def browser():
     """A browser of its own."""
-    opened = Browser()
+    opened = Browser(whole=False)
     yield opened
     opened.close()
 

@@ -51,6 +51,8 @@ BARS = """return import("/static/js/questions/claim_bar.js").then(({ claimBar })
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class ConsoleInABrowser(ConsolePage, unittest.TestCase):
+    whole_browser = True
+
     @classmethod
     def setUpClass(cls):
         cls.bags = cls.make_folder()

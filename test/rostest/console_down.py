@@ -85,7 +85,7 @@ class DownTest(ConsolePage, unittest.TestCase):
         cls.audited = []
         rospy.Subscriber('/expert_console/audit', ConsoleCommand, cls.audited.append)
         cls.console = cls.start_console('_stores:=' + cls.store, '_token_file:=' + cls.tokens)
-        cls.browser = Browser(1360, 1000)
+        cls.browser = Browser(1360, 1000, whole=False)
         cls.browser.driver.set_script_timeout(60)
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get('http://localhost:{}/#machines'.format(cls.port))

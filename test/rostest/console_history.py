@@ -84,7 +84,7 @@ class SituationAndHistory(ConsolePage, unittest.TestCase):
             '__name:=alpha',
         )
         cls.console = cls.start_console()
-        cls.browser = Browser(1360, 1000)
+        cls.browser = Browser(1360, 1000, whole=False)
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get('http://localhost:{}/'.format(cls.port))
         cls.remember_name(cls.browser, 'operator')

@@ -92,6 +92,8 @@ class Node:
 class ConsolePage:
     """Beside unittest.TestCase."""
 
+    whole_browser = False
+
     @classmethod
     def begin(cls, robot, *arguments, size=(), name='operator'):
         """Start the console, the robot /alpha (a file beside this one, and its arguments) and a
@@ -103,7 +105,7 @@ class ConsolePage:
         cls.page = 'http://localhost:{}/'.format(cls.port)
         cls.console = cls.start_console()
         cls.robot = cls.start_robot(robot, *arguments)
-        cls.browser = Browser(*size)
+        cls.browser = Browser(*size, whole=cls.whole_browser)
         wait_for(cls.page_is_served, 40.0)
         cls.browser.driver.get(cls.page)
         if name:

@@ -62,7 +62,7 @@ class People(ConsolePage, unittest.TestCase):
             ),
         )
         cls.begin('console_robot.py', 'PICK', '0.1', '0', '9', name='')
-        cls.phone = Browser(390, 844)
+        cls.phone = Browser(390, 844, whole=False)
         cls.phone.driver.get(cls.page)
 
     @classmethod

@@ -67,6 +67,7 @@ take();"""
 
 @unittest.skipUnless(WITH_BROWSER, 'there is no chromedriver')
 class Teleoperation(ConsolePage, unittest.TestCase):
+    whole_browser = True
     forward = -1.0  # how the pad was pushed last
 
     @classmethod

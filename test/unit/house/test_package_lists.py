@@ -18,6 +18,7 @@ OF_DEVELOPERS = {
     'catkin_lint',
     'chromium',
     'chromium-driver',
+    'chromium-headless-shell',
     'python3-selenium',
     'axe-playwright-python',
     'node-typescript',
