@@ -55,7 +55,6 @@ LONGEST = (
     'unit/scripted_operator',
     'mypy',
     'unit/expert',
-    'rostest/task_cluster',
     'rostest/task_experiment',
     'rostest/oracle_programs_built',
     'rostest/oracle_programs_nested',

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Whole experiments with run_trials, which starts masters of its own: to the end, stopped, killed,
-and gone on with.
+gone on with, and on a cluster.
 """
 
 import io
@@ -10,11 +10,11 @@ import subprocess
 import sys
 import tempfile
 import time
-import unittest
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import List
 
+from task_cluster import TrialsOnACluster
 from waiting import wait_for
 
 from smach_oracle.analysis import trial_steps
@@ -54,7 +54,18 @@ def processes_of(output: Path) -> List[int]:
     return found
 
 
-class Experiment(unittest.TestCase):
+class Experiment(TrialsOnACluster):
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Run an experiment to its end, with which others are compared."""
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        cls.whole = Path(folder.name) / 'another run'
+        process = start(cls.whole, 2)
+        cls.text = process.communicate(timeout=300)[0]
+        assert process.returncode == 0, cls.text
+        assert processes_of(cls.whole) == []
+
     def setUp(self) -> None:
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
@@ -72,13 +83,15 @@ class Experiment(unittest.TestCase):
             wait_for(lambda: len(list(self.bags.glob('*.bag'))) > count, 240.0), 'no trials'
         )
 
+    def test_it_ends_with_a_table_and_figures(self) -> None:
+        self.assertRegex(self.text, 'PICK_AND_PLACE  without oracle +2 ')
+        for name in ('time_series.png', 'time_series.svg'):
+            self.assertTrue((self.whole / name).is_file(), name)
+
+    def test_rows_of_a_cluster_are_the_same_although_a_worker_is_killed(self) -> None:
+        self.check_rows_although_a_worker_is_killed(self.whole, self.output, start)
+
     def test_killed_in_the_middle_it_goes_on_as_if_nothing_had_happened(self) -> None:
-        whole = Path(str(self.output) + ' of another run')
-        text = self.finish(start(whole, 2))
-        self.assertRegex(text, 'PICK_AND_PLACE  without oracle +2 ')
-        self.assertTrue(
-            (whole / 'time_series.png').is_file() and (whole / 'time_series.svg').is_file()
-        )
         killed = start(self.output, 2)
         self.some_trials(0)
         killed.kill()
@@ -90,7 +103,9 @@ class Experiment(unittest.TestCase):
         # the same seeds: the same states, outcomes and decisions
         with redirect_stdout(io.StringIO()) as told:
             self.assertEqual(
-                trial_steps.main([str(self.output), str(whole)]), trial_steps.SAME, told.getvalue()
+                trial_steps.main([str(self.output), str(self.whole)]),
+                trial_steps.SAME,
+                told.getvalue(),
             )
         self.assertIn('4 trials in both', told.getvalue())
         refused = start(self.output, 9)
