@@ -78,16 +78,22 @@ def test_a_drink_that_was_grasped_with_an_inclined_hand_is_carried_upright():
     in_kitchen(1, 5, upright)
 
 
+def steepest(limb, way):
+    """How far the hand tilts on a path, at most, rad."""
+    upright = limb.pose()[2, :3]
+    points = np.vstack([np.linspace(*ends, 20) for ends in zip(way[:-1], way[1:])])
+    return max(np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in points)
+
+
 def test_on_a_level_way_the_hand_hardly_tilts():
     def level(world, trial):
         pick(trial, attempt=0)
         with Arm(trial.skills.context, 'right', {}, 1) as limb:
-            above = limb.pose()
-            above[:3, 3] += (0.10, 0.30, 0.10)
-            way = limb.level_path(limb.reach(above, near=limb.now())[0])
-            upright = limb.pose()[2, :3]
-            tilts = [np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in way]
-        assert max(tilts) <= TILT + 1e-6
+            there = limb.pose()
+            there[:3, 3] += (0.10, 0.30, -0.20)
+            goal = limb.reach(there, near=limb.now())[-1]
+            assert steepest(limb, limb.level_path(goal)) <= TILT
+            assert steepest(limb, limb.path(goal)) > 2 * TILT, 'there is another way'
 
     in_kitchen(1, 5, level)
 
