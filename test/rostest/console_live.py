@@ -59,6 +59,24 @@ KEPT = (
   found.push(await asked(), said("ann"));
   return found;"""
 )
+# a console that was restarted has not heard of the question when the page is back: what is said of
+# it then, whether it is claimed again once the console lists it, and what is said after that
+NOT_LISTED_YET = (
+    OF_A_QUESTION
+    % """
+  said("");
+  await detail.claim("claim");
+  said("ann");
+  store.receive({ now: 0, sections: { questions: [] } });
+  replies.push({ ok: false, message: "This question is open no longer." });
+  detail.connected();
+  await detail.claimed;
+  const before = told.length;
+  detail.claimedAt = -Infinity;
+  said("");
+  await detail.claimed;
+  return [told.slice(before), detail.held, detail.problem, said("ann")];"""
+)
 # which commands wait for nothing, where all are silent and the person has no name
 PASSES = """
 return import("/static/js/page/gate.js").then(({ Gate }) => {
@@ -153,6 +171,11 @@ class Live(ConsolePage, unittest.TestCase):
 
     def test_2_a_claim_that_could_not_be_made_again_is_tried_again(self):
         self.assertEqual(self.browser.run(KEPT), [2, True, 2, 3, 'It is yours. Leave it to others'])
+
+    def test_2_a_claim_outlasts_a_console_that_was_restarted(self):
+        told, is_held, problem, shown = self.browser.run(NOT_LISTED_YET)
+        self.assertEqual((told, is_held, problem), (['claim'], True, ''))
+        self.assertIn(YOURS, shown)
 
     def test_3_with_a_dead_master_no_answer_is_sent(self):
         self.master.kill()

@@ -188,8 +188,9 @@ export class QuestionDetail {
     this.claimedAt = performance.now();
     try {
       const reply = await this.app.connection.request(command, { question: this.key });
-      // who is out of reach has given it to nobody else
-      this.held = reply.ok || (command === 'claim' && this.held && this.free);
+      // who is out of reach, or was restarted and has not heard of it yet, has given it to nobody
+      const unclaimed = this.free || !this.now;
+      this.held = reply.ok || (command === 'claim' && this.held && unclaimed);
       if (!reply.ok) this.problem = reply.message;
       if (this.ended && reply.ok && !this.settled) this.release();
     } catch (err) {
