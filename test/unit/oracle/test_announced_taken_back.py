@@ -4,7 +4,10 @@ import pytest
 from machines import FakeExpert, Scripted, Watched, supersede
 from reporting_machines import BAD, made, reporting
 
+from smach_oracle.oracle.machine.tree_node import marked_node
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.visits import Visit, VisitResult
+from smach_oracle.oracle.recovery.failure import _context_then
 
 
 @pytest.mark.parametrize('superseded', [1, 2])
@@ -90,3 +93,19 @@ def test_a_superseded_state_is_the_latest_one_before_the_next():
     )
     assert machine.run() == 'done'
     assert machine.decisions() == [('ask', ''), ('step_back', 'WORK')]
+
+
+def test_of_a_failure_that_is_forgotten_the_visits_say_what_came_before():
+    """Ten failures are remembered. The visits of the chain may go back farther."""
+    machine = reporting(Scripted('failed', outcomes=BAD)).machine
+    node = marked_node(machine)
+    before = (
+        Visit('REPORT', 'said', VisitResult.SUCCESS),
+        Visit('LOOK', 'seen', VisitResult.SUCCESS),
+        Visit('WORK', 'ok', VisitResult.SUCCESS),
+        Visit('REPORT', 'failed', VisitResult.FAILURE),
+    )
+    record = node.record('WORK')
+    assert _context_then(node, record, before).succeeded_before == 'LOOK'
+    assert _context_then(node, record, before[2:]).succeeded_before is None
+    assert _context_then(node, record, before).unconditioned == 'REPORT'

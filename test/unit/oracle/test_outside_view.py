@@ -1,15 +1,21 @@
 """What adapters and operators ask of a machine, and tell it, from outside."""
 
+import copy
+
 import pytest
+from forked import in_a_fork
 from held_machines import Gate, Held
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.errors import SettingsError, TrialError
+from smach_oracle.oracle.machine.tree_node import marked_node
 from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.facts import told_in_words
+from smach_oracle.oracle.scope.clock import Clock, PausableClock
+from smach_oracle.oracle.scope.scope import Reason, Scope
 
 
 def warnings_in(log):
@@ -143,3 +149,55 @@ def test_a_plain_success_is_told_to_who_registered_for_transitions():
     for _ in range(3):  # from the second time on each takes the short way
         assert machine.run() == 'done'
     assert told == [['B'], ['C']] * 3
+
+
+# -- in a child process of the program
+
+
+def test_in_a_child_process_a_machine_is_what_its_author_wrote(log):
+    """Its nested machines, too. One that was built under an oracle is only observed there."""
+    built = OracleContainer(['done', 'aborted', 'preempted'], name='built')
+    failing = Scripted('aborted')
+    with built:
+        OracleContainer.add('A', failing, {'ok': 'done'})
+    inner = chain_of(Scripted('aborted'))
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('INNER', inner, {'done': 'done'})
+    asked = FakeExpert()
+    OracleContainer.wrap(machine, name='task', expert=asked)
+
+    def in_child():
+        outcomes = machine.execute(), machine.execute(), built.execute()
+        oracle = oracle_of(built)
+        kinds = [type(each) is smach.StateMachine for each in (machine, inner)]
+        return outcomes, kinds, (oracle.recovers, oracle.name), warnings_in(log)
+
+    outcomes, kinds, told, warned = in_a_fork(in_child)
+    assert outcomes == ('aborted', 'done', 'aborted'), 'INNER has succeeded once it was tried again'
+    assert (kinds, told) == ([True, True], (False, 'built'))
+    without = '{}: runs in a child process of the program, and without an oracle there'
+    assert [text for text in warned if 'child process' in text] == [
+        without.format('task'),
+        without.format('built'),
+    ]
+    assert machine.execute() == 'done' and oracle_of(machine).recovers
+    assert asked.questions == []
+
+
+def test_a_record_is_of_a_state_of_the_machine():
+    machine = watched(Scripted()).machine
+    node = marked_node(machine)
+    with pytest.raises(smach.InvalidStateError, match="'NOWHERE' is no state of SM_ROOT"):
+        node.record('NOWHERE')
+    with pytest.raises(smach.InvalidStateError, match='ORACLE'):
+        node.record('ORACLE')
+
+
+@pytest.mark.parametrize('copied', [copy.copy, copy.deepcopy])
+def test_nothing_that_is_under_way_travels_with_a_copy(copied):
+    scope = Scope()
+    scope.cancel(Reason.PREEMPTED)
+    assert copied(scope).reason is None
+    clock = PausableClock(Clock())
+    assert type(copied(clock)) is PausableClock and copied(clock).now() > 0.0

@@ -131,6 +131,23 @@ def test_what_an_unmet_one_wrote_is_taken_back():
     assert seeing.userdata.where == ('red', 1)
 
 
+def test_what_was_handed_down_to_an_unmet_one_is_taken_back():
+    """Two containers lie above LOOK. Nothing of the way down to it stays in either."""
+    look = Scripted('aborted', 'ok', input_keys=['x'])
+    inner = chain(LOOK=look)
+    middle = chain(INNER=inner)
+    for container in (inner, middle):
+        container.register_input_keys(['x'])
+    top = chain(MIDDLE=middle, PICK=Scripted('ok', 'aborted'))
+    top.userdata.x = 1
+    machine = wrapped(top, 'PICK', 'MIDDLE/INNER/LOOK', expert=FakeExpert(give_up()))
+    smach.StateMachine.set_initial_state(top, ['PICK'])
+    top.get_children()['PICK'].script = ['aborted']
+    machine.run()
+    assert look.runs == 1
+    assert (list(middle.userdata.keys()), list(inner.userdata.keys())) == ([], [])
+
+
 def test_a_machine_of_another_container_that_fails_as_a_precondition_asks_nobody():
     expert = FakeExpert(supersede('ok'))
     see = chain(AIM=chain(FOCUS=Scripted('ok', 'aborted', 'aborted', 'aborted')))

@@ -13,6 +13,7 @@ from killed_machines import KilledMachine
 from killed_trees import flat
 from machines import Scripted, Watched, chain_of
 
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS, base_of, merged
 from smach_oracle.oracle.records import folder_locks as lock_module
 from smach_oracle.oracle.records.folder_locks import folder_lock
@@ -63,6 +64,27 @@ def test_of_another_estimator_the_totals_alone_are_added():
         theirs.add(failed)
     found = merged(own.snapshot(), {}, theirs.snapshot(), 5)
     assert found == dict(own.snapshot(), successes=4, failures=2)
+
+
+def test_a_file_that_is_set_later_replaces_what_was_learned_and_gets_what_is_new(tmp_path):
+    path = tmp_path / 'rates.json'
+    for _ in range(3):
+        machine(path, 'TASK', []).run()
+    later = Watched(chain_of(Scripted('aborted')), name='TASK')
+    later.run()
+    OracleContainer.wrap(later.machine, name='TASK', settings={'rates_file': str(path)})
+    later.run()
+    assert (later.rate('A').successes, later.rate('A').failures) == (4, 0)
+    assert learned(path, 'TASK') == (4, 0)
+
+
+def test_another_file_gets_all_that_was_learned(tmp_path):
+    first, second = tmp_path / 'first.json', tmp_path / 'second.json'
+    task = machine(first, 'TASK', ['aborted'])
+    task.run()
+    OracleContainer.wrap(task.machine, name='TASK', settings={'rates_file': str(second)})
+    task.run()
+    assert (learned(first, 'TASK'), learned(second, 'TASK')) == ((1, 1), (2, 1))
 
 
 def test_a_machine_under_another_name_goes_on_with_what_was_learned(tmp_path):

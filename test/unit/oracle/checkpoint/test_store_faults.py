@@ -14,7 +14,9 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.checkpoint.trial_store import understood
 from smach_oracle.oracle.errors import CheckpointError
+from smach_oracle.store.errors import StoreDamaged, StoreError
 from smach_oracle.store.store_file import StoreFile
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -206,3 +208,19 @@ def test_one_stopped_by_ctrl_c_goes_on(tmp_path):
     )
     assert resumed.execute() == 'succeeded'
     assert ran == ['B']
+
+
+@pytest.mark.parametrize(
+    ('raised', 'told', 'says'),
+    [
+        (CheckpointError('the trial is gone'), CheckpointError, '^the trial is gone$'),
+        (StoreError('robot.db: is locked'), StoreError, '^robot.db: is locked$'),
+        (StoreError('is locked'), StoreDamaged, '^robot.db: is locked$'),
+        (KeyError('at'), StoreDamaged, r"robot.db: is damaged.*KeyError\('at'\).*`oracle_state"),
+        (TypeError('no text'), StoreDamaged, 'robot.db: is damaged'),
+    ],
+)
+def test_what_cannot_be_understood_of_a_store_names_it(raised, told, says):
+    with pytest.raises(told, match=says) as caught, understood('robot.db'):
+        raise raised
+    assert type(caught.value) is told

@@ -1,0 +1,87 @@
+"""Goals that a killed program has left running are ended before anything is sent."""
+
+import os
+import signal
+
+from killed_machines import KilledMachine, Noted
+from killed_trees import ENDS
+
+import smach
+from smach_oracle.oracle.records.running_goals import GOALS
+
+
+class Sends(Noted):
+    """Sends a goal. The first two processes are killed while that runs."""
+
+    def execute(self, userdata):
+        GOALS.begin('reach', '/arm')
+        self._diary.write('sends', self._name)
+        if self._diary.count('sends')[self._name] <= 2:
+            os.kill(os.getpid(), signal.SIGKILL)
+        GOALS.end('reach')
+        return Noted.execute(self, userdata)
+
+
+def sending(diary, points):
+    def end_goals(goals, must_stop):
+        assert not must_stop()
+        for goal_id, server in goals.items():
+            diary.write('ends', '{} of {}'.format(goal_id, server))
+        return {'reach': '/arm'}
+
+    GOALS.end_goals = end_goals
+    machine = smach.StateMachine([*ENDS])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('A', Sends('A', diary, points), {'succeeded': 'B'})
+        smach.StateMachine.add('B', Noted('B', diary, points), ENDS)
+    return machine
+
+
+def test_what_still_runs_is_ended_and_what_may_run_on_is_told(tmp_path):
+    killed = KilledMachine(tmp_path, sending)
+    assert killed.run() is None
+    assert killed.diary.count('ends') == {}
+    assert killed.run() is None, 'it goes on, and is killed again'
+    assert killed.diary.count('ends') == {'reach of /arm': 1}
+    told = killed.run()
+    assert (told['outcome'], killed.diary.count('ends')['reach of /arm']) == ('succeeded', 2)
+    log = '\n'.join(told['log'])
+    assert 'TOP: the program was killed while a goal of /arm ran: cancelled, and waited for' in log
+    assert 'TOP: a goal of /arm may still run' in log
+
+
+def test_a_goal_that_runs_as_a_trial_begins_is_stored_too(tmp_path):
+    """It was sent before the machine began, such as by the script itself."""
+
+    def sent_before(diary, points):
+        if not diary.count('sends'):
+            GOALS.keep('lift', '/torso')
+        return sending(diary, points)
+
+    killed = KilledMachine(tmp_path, sent_before)
+    assert killed.run() is None
+    assert killed.run() is None
+    assert killed.diary.count('ends') == {'lift of /torso': 1, 'reach of /arm': 1}
+
+
+def test_a_goal_that_has_ended_when_the_next_state_begins_is_forgotten(tmp_path):
+    class EndsFirst(Noted):
+        def execute(self, userdata):
+            GOALS.begin('look', '/camera')
+            GOALS.end('look')
+            return Noted.execute(self, userdata)
+
+    def ending(diary, points):
+        machine = sending(diary, points)
+        with machine:
+            first = EndsFirst('FIRST', diary, points)
+            smach.StateMachine.add('FIRST', first, {'succeeded': 'A', 'aborted': 'aborted'})
+        machine.set_initial_state(['FIRST'])
+        return machine
+
+    killed = KilledMachine(tmp_path, ending)
+    assert killed.run() is None
+    assert killed.run() is None
+    assert killed.diary.count('ends')['look of /camera'] == 0
+    assert killed.diary.count('ends')['reach of /arm'] == 1
