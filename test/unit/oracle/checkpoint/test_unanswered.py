@@ -180,9 +180,9 @@ def test_killed_as_it_is_kept_it_asks_again(tmp_path):
 class Meets(smach.State):
     """Ends once the other one runs as well; the first time the program is killed then."""
 
-    def __init__(self, name, diary, folder):
+    def __init__(self, name, diary):
         smach.State.__init__(self, ['succeeded', 'preempted'])
-        self._name, self._diary, self._killed = name, diary, folder / 'was_killed'
+        self._name, self._diary = name, diary
         self._before = diary.count('begins')
 
     def execute(self, userdata):
@@ -191,8 +191,7 @@ class Meets(smach.State):
         if self.preempt_requested():
             self.service_preempt()
             return 'preempted'
-        if not self._killed.exists():
-            self._killed.touch()
+        if not self._before:  # in the first process neither ends
             os.kill(os.getpid(), signal.SIGKILL)
         self._diary.write('ends', self._name)
         return 'succeeded'
@@ -202,23 +201,20 @@ class Meets(smach.State):
         return all(begun[name] > self._before[name] for name in ('LEFT', 'RIGHT'))
 
 
-def meeting(folder):
-    def build(diary, points):
-        both = smach.Concurrence(
-            ['succeeded', 'aborted'],
-            'aborted',
-            outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}},
-        )
-        with both:
-            both.add('LEFT', Meets('LEFT', diary, folder))
-            both.add('RIGHT', Meets('RIGHT', diary, folder))
-        return around('BOTH', both, {'succeeded': 'C', 'aborted': 'C'}, C=Noted('C', diary, points))
-
-    return build
+def meeting(diary, points):
+    both = smach.Concurrence(
+        ['succeeded', 'aborted'],
+        'aborted',
+        outcome_map={'succeeded': {'LEFT': 'succeeded', 'RIGHT': 'succeeded'}},
+    )
+    with both:
+        both.add('LEFT', Meets('LEFT', diary))
+        both.add('RIGHT', Meets('RIGHT', diary))
+    return around('BOTH', both, {'succeeded': 'C', 'aborted': 'C'}, C=Noted('C', diary, points))
 
 
 def test_in_a_concurrence_the_branch_that_was_answered_stops_as_well(tmp_path):
-    killed = KilledMachine(tmp_path, meeting(tmp_path), on_resume='ask')
+    killed = KilledMachine(tmp_path, meeting, on_resume='ask')
     assert killed.run() is None
 
     def give(question, number):
