@@ -35,7 +35,7 @@ LIMIT_BY_WAYS = 3900.0
 # of one that also counts 120 results of its ways: 4410 to 5020, likewise
 LIMIT_LEARNING = 5900.0
 ROUNDS = 15
-MACHINES = 4  # with many visits: one that meets a busy moment is no measure
+MACHINES = 4  # with many visits, at most: one that meets a busy moment is no measure
 FAILURES = 300
 MENU = ('again', 'wait 10 s', 'wait 60 s', 'prepare', 'from B')
 
@@ -102,6 +102,19 @@ def _limit(policy: str) -> float:
     return LIMIT_BY_WAYS if POLICIES[policy].goes_by_ways else LIMIT
 
 
+def after_many(visits: int, policy: str, enough: float) -> float:
+    """The best decision after `visits` visits, in seconds, of up to MACHINES machines.
+
+    The first that is as fast as `enough` is the last: the best of all of them would be, too.
+    """
+    best = float('inf')
+    for _ in range(MACHINES):
+        best = min(best, *machine_after(visits, policy)[1])
+        if best <= enough:
+            break
+    return best
+
+
 def main() -> int:
     """Measure and report."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
@@ -118,7 +131,7 @@ def main() -> int:
     for policy in sorted(set(POLICIES).difference(each.name for each in left_out)):
         rounds = [(bare_step_s(20000), min(machine_after(10, policy)[1])) for _ in range(ROUNDS)]
         bare, few = (min(column) for column in zip(*rounds))
-        many = min(min(machine_after(args.visits, policy)[1]) for _ in range(MACHINES))
+        many = after_many(args.visits, policy, few * GROWTH_LIMIT if args.check else 0.0)
         steps, growth = few / bare, many / few
         limit = _limit(policy)
         is_missed = is_missed or steps > limit or growth > GROWTH_LIMIT
