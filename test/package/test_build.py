@@ -5,7 +5,14 @@ yields to upstream.
 import re
 
 import pytest
-from workspace import PYTHON, copy_sources, fake_upstream, leave_one_of_each, run
+from workspace import (
+    PYTHON,
+    copy_sources,
+    fake_upstream,
+    leave_few_actions,
+    leave_one_of_each,
+    run,
+)
 
 NAMES = ('smach', 'smach_ros', 'smach_msgs', 'control_msgs')
 WHERE = (
@@ -42,7 +49,7 @@ print('ended in', machine.execute())
 def installed(tmp_path_factory):
     """An install space, built alone in a build folder beside its sources, which are gone by now."""
     top = tmp_path_factory.mktemp('alone')
-    copy_sources(top / 'smach_oracle')
+    leave_few_actions(copy_sources(top / 'smach_oracle'))
     (top / 'out').mkdir()
     run(
         # not `make` first: each of the two would look at every target
@@ -69,6 +76,18 @@ def test_installed_messages_are_found_by_rosmsg(installed):
     assert 'max_effort' in in_installed(
         installed, 'rosmsg show control_msgs/GripperCommandActionGoal'
     )
+
+
+def test_every_message_service_and_action_is_installed(installed):
+    (target,) = (installed / 'installed/lib').glob('python3*/*-packages/smach_oracle')
+    share = installed / 'installed/share/smach_oracle'
+    modules = {'msg': 'msg/_{}.py', 'srv': 'srv/_{}.py', 'action': 'msg/_{}Action.py'}
+    for kind, module in modules.items():
+        written = sorted((installed / 'moved_away' / kind).iterdir())
+        assert written
+        for path in written:
+            assert (share / kind / path.name).is_file()
+            assert (target / module.format(path.stem)).is_file()
 
 
 def test_every_command_is_installed_for_rosrun(installed):

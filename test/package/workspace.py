@@ -10,6 +10,8 @@ LEFT_OUT = ('.git', '.venv*', 'build', '.build', '__pycache__', '*.pyc', '.*_cac
 RESULTS = (ROOT / 'trials', ROOT / 'doc/trials')  # a package of src/ may have that name too
 # of each kind one, with the messages that it names
 ONE_OF_EACH = ('UserdataItem.msg', 'SeenThing.msg', 'Recognise.srv', 'SharedAutonomy.action')
+# what an oracle asks, and hands over
+INSTALLED_ACTIONS = ('ExpertQuery.action', 'SharedAutonomy.action')
 UPSTREAM_CMAKE = """cmake_minimum_required(VERSION 3.5)
 project({0})
 find_package(catkin REQUIRED)
@@ -50,6 +52,16 @@ def leave_one_of_each(sources: Path) -> None:
         for path in (sources / kind).iterdir():
             if path.name not in ONE_OF_EACH:
                 path.unlink()
+
+
+def leave_few_actions(sources: Path) -> None:
+    """Take away most actions: each is seven messages, and two processes for each of these.
+
+    `scripts/setup` has built all of them in this checkout, with the same CMakeLists.txt.
+    """
+    for path in (sources / 'action').iterdir():
+        if path.name not in INSTALLED_ACTIONS:
+            path.unlink()
 
 
 def fake_upstream(source_space: Path, name: str) -> None:
