@@ -6,12 +6,14 @@ import fcntl
 import json
 import os
 import threading
+from types import SimpleNamespace
 
 import pytest
 from branch_machines import Item, inside, iterator_over
 from guarded_machines import both
 from held_machines import Held
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
+from test_time_limits import LimitClock
 from waiting import wait_for
 
 import smach
@@ -126,7 +128,7 @@ def test_what_is_in_a_machine_that_is_left_behind_stays_preempted_too(limits, fr
     assert wait_for(lambda: not left.preempt_requested())
 
 
-def test_what_overruns_while_its_container_is_left_stays_preempted(log, free):
+def test_what_overruns_while_its_container_is_left_stays_preempted(log, free, monkeypatch):
     """RIGHT fails, and the expert sends the machine out of the Concurrence. LEFT heeds nothing."""
     begun, after = threading.Event(), Scripted()
 
@@ -139,13 +141,13 @@ def test_what_overruns_while_its_container_is_left_stays_preempted(log, free):
         return 'aborted'
 
     left = Scripted(slow)
+    is_left = SimpleNamespace(is_set=left.preempt_requested)
+    LimitClock(monkeypatch).end(2, is_left)  # the limit of INNER, and its grace period
     inner = both(LEFT=chain_of(left), RIGHT=chain_of(Scripted(fails)))
     machine = Watched(
         above(inner, after),
         expert=FakeExpert(goto('AFTER', container='SM_ROOT')),
-        settings={
-            'states': {'INNER': LIMITED, 'INNER/RIGHT/A': {'max_recoveries': 0}},
-        },
+        settings={'states': {'INNER': LIMITED, 'INNER/RIGHT/A': {'max_recoveries': 0}}},
     )
     assert machine.run() == 'done'
     assert (after.runs, left.preempt_requested()) == (1, True)
