@@ -79,6 +79,20 @@ def test_the_actions_are_those_of_the_policy():
     assert dict(listing['PICK'].actions)[low] == (Action.REVISIT, Action.STEP_BACK)
 
 
+@pytest.mark.parametrize(
+    ('most', 'actions'),
+    [
+        (1, (Action.REVISIT, Action.STEP_BACK)),
+        (3, (Action.REVISIT, Action.STEP_BACK)),
+        (4, (Action.REVISIT, Action.STEP_BACK, Action.ASK)),
+    ],
+)
+def test_the_actions_are_those_of_each_failure_up_to_the_last_recovery(most, actions):
+    """ladder tries once, steps back three times, and then asks."""
+    states = told({'policy': 'ladder', 'max_recoveries': most})
+    assert dict(states['HOME'].actions)[FailureClass.LOW] == actions
+
+
 @pytest.mark.parametrize('on_retry', ['confirm', 'never'])
 def test_of_a_state_that_is_not_repeated_by_itself_the_oracle_asks(on_retry):
     settings = {'states': {'PICK': {'on_retry': on_retry}, 'PLACE/PUT': {'on_retry': on_retry}}}

@@ -12,7 +12,7 @@ import pytest
 from branch_machines import Item, inside, iterator_over
 from guarded_machines import both
 from held_machines import Held
-from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
+from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede, watched
 from test_time_limits import LimitClock
 from waiting import wait_for
 
@@ -154,6 +154,36 @@ def test_what_overruns_while_its_container_is_left_stays_preempted(log, free, mo
     assert [event.path for event in machine.of(EventKind.FAILURE)] == ['SM_ROOT/INNER/RIGHT']
     told = 'SM_ROOT/INNER: was left for a state of another container, and overran its time limit'
     assert any(text.startswith(told) for text in warnings_in(log))
+
+
+def test_a_precondition_that_heeds_no_preempt_is_not_preempted_when_it_runs_again():
+    def asked_to_stop(state, ud):
+        machine.machine.request_preempt()
+        assert state.preempt_requested()
+        return 'ok'
+
+    look = Scripted(asked_to_stop)
+    machine = Watched(chain_of(Scripted('aborted'), look), preconditions={'A': ['B']})
+    assert machine.run() == 'preempted'
+    assert not look.preempt_requested()
+
+
+def test_a_question_shows_the_visits_of_this_execution_of_a_concurrence_alone():
+    concurrence = smach.Concurrence(
+        outcomes=['done', 'aborted'], default_outcome='aborted', outcome_map={'done': {'A': 'ok'}}
+    )
+    with concurrence:
+        smach.Concurrence.add('A', Scripted('ok', 'aborted'))
+    machine = smach.StateMachine(outcomes=['done', 'aborted'])
+    with machine:
+        smach.StateMachine.add('BOTH', concurrence, {'done': 'AGAIN'})
+        again = Scripted('again', outcomes=('ok', 'again'))
+        smach.StateMachine.add('AGAIN', again, {'again': 'BOTH', 'ok': 'done'})
+    expert = FakeExpert(supersede('ok'))
+    machine = Watched(machine, expert=expert, settings={'max_recoveries': 0})
+    assert machine.run() == 'done'
+    (question,) = expert.questions
+    assert [(visit.state, visit.outcome) for visit in question.history] == [('A', 'aborted')]
 
 
 def test_an_operators_jump_to_a_state_that_is_taken_out_meanwhile_is_dropped(log):

@@ -163,8 +163,7 @@ class Step:
         node.records.visit_ended(
             record, told, VisitResult.FAILURE if departure.is_own(node) else VisitResult.PREEMPTED
         )
-        if not isinstance(outcome, Overrun):  # what still runs goes on to be preempted
-            recall_preempts(states_of(self._machine)[record.label])
+        recall_preempts(states_of(self._machine)[record.label])
         if departure.arrives_at is not node:
             return self._advance(told, Route(leaving_outcome(node), False), facts=LEFT)
         failure = Failure(
@@ -256,22 +255,16 @@ class Step:
             return self._end(failure, natural_ending(node, failure), UNCOUNTED if why else NO_FACTS)
         if why and record.unwell_repeats >= record.most_repeats:
             return self._failed(failure, why)
-        state = states_of(self._machine)[record.label]
-        if not why and state.preempt_requested():
-            recall_preempts(state)  # it came after the state's end: the meta state services it
+        if not why:  # a request came after the state's end: the meta state services it
+            recall_preempts(states_of(self._machine)[record.label])
         return occasions.unwell(failure, self._context(), why)
 
     def _failed(self, failure: Failure, why_unwell: str = '') -> Union[Occasion, Stop]:
         """Count the failure and recover from it. `why_unwell`: the robot is not well."""
         node, record = self._node, self._record
         state = states_of(self._machine)[record.label]
-        if (
-            node.tree.recover
-            and failure.kind is not FailureKind.TIME_LIMIT
-            and isinstance(state, smach.Container)
-        ):
-            # a Concurrence that has failed has preempted its branches. One that overran still runs
-            recall_preempts(state)
+        if node.tree.recover and isinstance(state, smach.Container):
+            recall_preempts(state)  # a Concurrence that has failed has preempted its branches
         context = self._context()
         node.records.note_failure(record)
         continuous = node.in_force.policy.is_continuous(context)

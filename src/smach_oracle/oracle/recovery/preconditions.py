@@ -177,7 +177,7 @@ def _execute(
         with origin.lock:
             origin.running = None
             cancelled = scope.told is not None
-        if cancelled and not node.tree.workers.blocked(state):
+        if cancelled:
             state.recall_preempt()  # the meta state services the request in its place
 
 

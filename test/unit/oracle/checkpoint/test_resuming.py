@@ -83,6 +83,17 @@ def test_a_trial_that_has_told_its_end_is_not_resumed(tmp_path):
     assert killed.run()['events'][0][0] == 'TRIAL_START'
 
 
+@pytest.mark.parametrize(('before_end', 'outcome'), [(0, 'succeeded'), (4, 'restarted')])
+def test_of_a_trial_that_does_not_go_on_the_store_says_how_it_ended(tmp_path, before_end, outcome):
+    """Killed between the end of its machine and its own end, or begun anew by the settings."""
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    whole = KilledMachine(make(tmp_path / 'whole'), flat).run()
+    assert killed.run(kill_at=whole['points'] - before_end) is None
+    killed.run(on_resume='restart' if outcome == 'restarted' else 'recover')
+    first, second = StoreFile(killed.store, read_only=True).trials('TOP')
+    assert (first.outcome, second.outcome) == (outcome, 'succeeded')
+
+
 def test_equal_values_of_two_keys_do_not_become_one_object(tmp_path):
     class Adds(smach.State):
         def __init__(self):
