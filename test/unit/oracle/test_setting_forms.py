@@ -34,6 +34,13 @@ def test_any_other_fallback_is_refused(given):
         checks.on_no_answer('on_no_answer', given)
 
 
+def test_a_fallback_that_yaml_reads_otherwise_says_so():
+    with pytest.raises(SettingsError, match='is not allowed. YAML reads ON as true: write "ON"'):
+        checks.on_no_answer('on_no_answer', {'goto': True})
+    with pytest.raises(SettingsError, match="is not allowed; allowed: 'stop'"):
+        checks.on_no_answer('on_no_answer', {'stop': True})
+
+
 def test_prices_may_be_those_of_other_settings():
     prices = checked_prices('prices', {'expert_minute': 7})
     assert checked_prices('prices', prices) == prices

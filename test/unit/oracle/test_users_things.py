@@ -186,6 +186,18 @@ def test_a_question_shows_the_visits_of_this_execution_of_a_concurrence_alone():
     assert [(visit.state, visit.outcome) for visit in question.history] == [('A', 'aborted')]
 
 
+def test_an_error_that_a_state_of_a_concurrence_makes_itself_is_the_one_that_is_told(log):
+    """It begins as SMACH's own does, and has no cause."""
+    own = smach.InvalidUserCodeError("Could not execute state 'ARM': no power")
+    concurrence = both(A=Scripted(own))
+    machine = Watched(inside(concurrence), settings={'max_recoveries': 0})
+    with pytest.raises(smach.SmachError):
+        machine.run()
+    (failure, *_) = machine.of(EventKind.FAILURE)
+    assert 'no power' in failure.text
+    assert not any('TypeError' in text for _, text in log)
+
+
 def test_an_operators_jump_to_a_state_that_is_taken_out_meanwhile_is_dropped(log):
     def takes_out(state, ud):
         held.hand.go_to('', 'C')

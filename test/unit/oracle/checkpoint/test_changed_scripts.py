@@ -12,6 +12,8 @@ from killed_machines import KilledMachine, Noted
 
 import smach
 from smach_oracle.oracle import Expert
+from smach_oracle.oracle.checkpoint.stored_marks import _joined
+from smach_oracle.oracle.records.visits import VisitMark
 from smach_oracle.store.state_command import main
 from smach_oracle.store.store_file import StoreFile
 
@@ -352,3 +354,10 @@ def shown(store):
     with contextlib.redirect_stdout(io.StringIO()) as out:
         assert main([store, 'show']) == 0
     return out.getvalue()
+
+
+@pytest.mark.parametrize('first_done', [False, True])
+def test_of_two_states_that_are_one_now_either_may_have_been_done(first_done):
+    one, other = (VisitMark(3, 1, first_done, False), VisitMark(2, 4, not first_done, False))
+    joined = _joined(one, other)
+    assert (joined.reached, joined.executed, joined.done) == (3, 4, True)

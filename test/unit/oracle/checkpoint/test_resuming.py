@@ -85,7 +85,7 @@ def test_a_trial_that_has_told_its_end_is_not_resumed(tmp_path):
 
 @pytest.mark.parametrize(('before_end', 'outcome'), [(0, 'succeeded'), (4, 'restarted')])
 def test_of_a_trial_that_does_not_go_on_the_store_says_how_it_ended(tmp_path, before_end, outcome):
-    """Killed between the end of its machine and its own end, or begun anew by the settings."""
+    """Killed between the end of its machine and its own, or given up for a new one."""
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     whole = KilledMachine(make(tmp_path / 'whole'), flat).run()
     assert killed.run(kill_at=whole['points'] - before_end) is None
