@@ -9,6 +9,7 @@ import importlib
 import json
 import os
 import runpy
+import signal
 import sys
 import textwrap
 import traceback
@@ -54,6 +55,7 @@ def ask(script: Path, *work: str) -> Dict[str, Any]:
     reading, writing = os.pipe()
     child = os.fork()
     if not child:
+        signal.alarm(120)  # one that waits for something before its parser is ended
         try:
             run_up_to_parser(writing, [str(script), *work])
         except BaseException:

@@ -17,6 +17,7 @@ from test_time_limits import LimitClock
 from waiting import wait_for
 
 import smach
+import smach_oracle.oracle.machine.workers as worker
 from smach_oracle.oracle.asking.answer_rules import check_output_keys
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.machine.userdata import UserdataGate
@@ -126,6 +127,36 @@ def test_what_is_in_a_machine_that_is_left_behind_stays_preempted_too(limits, fr
     assert left.preempt_requested()
     free.set()
     assert wait_for(lambda: not left.preempt_requested())
+
+
+def test_a_users_own_recall_is_there_again_once_what_was_left_behind_has_ended(free):
+    recalled, left = [], heedless(free)
+    left.recall_preempt = lambda: recalled.append(True)
+    machine = Watched(above(chain_of(left)), settings={'states': {'INNER/A': LIMITED}})
+    machine.run()
+    left.recall_preempt()
+    assert (recalled, left.preempt_requested()) == ([], True)
+    free.set()
+    assert wait_for(lambda: recalled)
+    assert vars(left)['recall_preempt'].__name__ == '<lambda>'
+
+
+def test_marks_of_what_has_ended_keep_nothing_from_being_left_behind():
+    """A copy has them, and what had ended while it was being left behind."""
+    inner = chain_of(Scripted())
+    outer = chain_of(inner)
+    calls = [SimpleNamespace(done=threading.Event()) for _ in range(2)]
+    worker._leave_behind(outer, calls[0])
+    calls[0].done.set()
+    worker._leave_behind(outer, calls[1])
+    for each in (outer, inner):
+        each.request_preempt()
+        each.recall_preempt()
+        assert each.preempt_requested()
+    calls[1].done.set()
+    for each in (outer, inner):
+        each.recall_preempt()
+        assert not each.preempt_requested() and 'recall_preempt' not in vars(each)
 
 
 def test_what_overruns_while_its_container_is_left_stays_preempted(log, free, monkeypatch):

@@ -288,7 +288,8 @@ def pulled_back(commanded: np.ndarray, measured: np.ndarray, lead: float) -> np.
     """Commanded joint positions (n,), within `lead` rad of the measured ones.
 
     So pushing at a wall piles up no force. All joints are pulled back alike: each by itself would
-    lead the tool away from its course.
+    lead the tool away from its course. A joint that is ahead to hold a load gives way, too, as long
+    as another one is blocked and the person goes on.
     """
     ahead = commanded - measured
     return measured + ahead * _ratio(lead, float(np.abs(ahead).max()))

@@ -105,6 +105,8 @@ class Workers:
                 self._block(state, call, _LATE)
                 run.cancel(Reason.LEFT_BEHIND)
                 _leave_behind(state, call)
+                if call.done.is_set():  # meanwhile, and what it took back may stand since
+                    recall_preempts(state)
             elif end is CallEnd.BY_ITSELF:
                 self.under_way.pop(id(state), None)
             else:
@@ -185,20 +187,32 @@ class _KeptRequest:
     """Stands in place of the `recall_preempt` of a state that was left behind, as long as it runs.
 
     So nobody takes its request back: no engine at the end of a container, no action server for the
-    goal before. A copy of the state does not run.
+    goal before. A deep copy of the state does not run. `own`: what a user had put in this place.
     """
 
-    def __init__(self, state: smach.State, call: Optional[BackgroundCall] = None) -> None:
+    def __init__(
+        self, state: smach.State, call: Optional[BackgroundCall] = None, own: object = None
+    ) -> None:
         self._state = state
         self._call = call
+        self.own = own
+
+    @property
+    def stands(self) -> bool:
+        """Whether the state still runs."""
+        return self._call is not None and not self._call.done.is_set()
 
     def __call__(self) -> None:
-        if self._call is None or self._call.done.is_set():
-            own_attributes(self._state).pop(_RECALL, None)
-            self._state.recall_preempt()
+        if self.stands:
+            return
+        attributes = own_attributes(self._state)
+        attributes.pop(_RECALL, None)
+        if self.own is not None:
+            attributes[_RECALL] = self.own
+        self._state.recall_preempt()
 
-    def __reduce__(self) -> Tuple[Type['_KeptRequest'], Tuple[smach.State]]:
-        return _KeptRequest, (self._state,)
+    def __reduce__(self) -> Tuple[Type['_KeptRequest'], Tuple[object, ...]]:
+        return _KeptRequest, (self._state, None, self.own)
 
 
 def _leave_behind(state: smach.State, call: BackgroundCall) -> None:
@@ -206,15 +220,18 @@ def _leave_behind(state: smach.State, call: BackgroundCall) -> None:
 
     Machines in it without an oracle end at their next state boundary, as both engines do then.
     """
+    if call.done.is_set():  # it has ended meanwhile
+        return
     kept = own_mark(state, _RECALL)
-    if kept is None or isinstance(kept, _KeptRequest):
-        own_attributes(state)[_RECALL] = _KeptRequest(state, call)
+    own = kept.own if isinstance(kept, _KeptRequest) else kept
+    own_attributes(state)[_RECALL] = _KeptRequest(state, call, own)
     try:
         if isinstance(state, smach.StateMachine) and mark_of(state) is None:
             set_executing(state, False)
         for child in _children(state):
+            kept = own_mark(child, _RECALL)
             # one that was left behind itself may run longer
-            if not isinstance(own_mark(child, _RECALL), _KeptRequest):
+            if not (isinstance(kept, _KeptRequest) and kept.stands):
                 _leave_behind(child, call)
     except Exception as err:  # a user's container may be of any make
         smach.logwarn('Could not stop what is left of {}: {}'.format(repr_of(state), repr_of(err)))
