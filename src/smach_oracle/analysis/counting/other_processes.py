@@ -125,8 +125,8 @@ class _Process:
         numbers, self._numbers = os.pipe()
         self.results, results = os.pipe()
         self._pid: Optional[int] = None
-        # Ctrl-C goes to all processes of a terminal. It waits until a child has said that it does
-        # not hear it: the parent ends it
+        # Ctrl-C goes to all processes of a terminal. A child ignores it, since the parent ends the
+        # child. Until then the signal is blocked
         mask = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
         try:
             self._pid = os.fork()
