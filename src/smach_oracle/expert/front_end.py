@@ -176,7 +176,7 @@ class FrontEnd:
                 name = topic[: -len('/open')]
                 if name not in self._servers:
                     self._follow(name)
-        for name, server in list(self._servers.items()):
+        for name, server in dict(self._servers).items():
             server.refresh(name + '/open' in lists, services.get(name + '/answer', ()))
             if self._discover:
                 self._forget_gone(name, server, name + '/open' in lists)

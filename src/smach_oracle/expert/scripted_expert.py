@@ -88,7 +88,7 @@ class ScriptedExpert:
             self._take_in({listed.key: listed for listed in self._front_end.questions()})
             self._charge()
             now_s = self._now()
-            for key, planned in list(self._planned.items()):
+            for key, planned in dict(self._planned).items():
                 if planned.due_s <= now_s:
                     self._answer(key, planned)
             self._charge()

@@ -240,7 +240,7 @@ class _Writer:
         return [plain(each) for each in list(values)]
 
     def _dict(self, value: Mapping[Any, Any]) -> Any:
-        items = list(value.items())
+        items = dict(value).items()
         if all([type(key) is str and key[:1] != '$' for key, _ in items]):
             plain = self.plain
             return {key: plain(each) for key, each in items}

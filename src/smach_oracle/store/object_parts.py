@@ -53,6 +53,6 @@ def attributes(value: object, kind: type) -> Iterator[str]:
     with contextlib.suppress(AttributeError):
         yield from map(str, list(object.__getattribute__(value, '__dict__')))
     for each in kind.__mro__:
-        for name, there in list(vars(each).items()):
+        for name, there in dict(vars(each)).items():
             if isinstance(there, MemberDescriptorType) and is_set(value, name):
                 yield name

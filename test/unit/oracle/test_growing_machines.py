@@ -1,5 +1,6 @@
 """A machine may grow in one thread while another one looks through the tree."""
 
+import gc
 import sys
 import threading
 
@@ -24,8 +25,14 @@ def test_a_tree_can_be_looked_through_while_a_machine_of_it_grows():
             except RuntimeError as err:
                 errors.append(err)
 
-    interval = sys.getswitchinterval()
+    def collected(phase, info):
+        """Run code in the midst of what is one step to other threads, as a finalizer does."""
+        return [phase for _ in range(50)]
+
+    interval, threshold = sys.getswitchinterval(), gc.get_threshold()
     sys.setswitchinterval(1e-6)
+    gc.callbacks.append(collected)
+    gc.set_threshold(5)
     try:
         thread = threading.Thread(target=look)
         thread.start()
@@ -36,5 +43,7 @@ def test_a_tree_can_be_looked_through_while_a_machine_of_it_grows():
         grown.set()
         thread.join(20)
     finally:
+        gc.set_threshold(*threshold)
+        gc.callbacks.remove(collected)
         sys.setswitchinterval(interval)
     assert looks and not errors

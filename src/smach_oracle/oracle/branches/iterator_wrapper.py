@@ -199,7 +199,7 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
 
     Any other Iterator of the container begins again when it is entered.
     """
-    for label, state in list(states_of(node.machine).items()):
+    for label, state in dict(states_of(node.machine)).items():
         wrapper = wrapper_of(state) if isinstance(state, smach.Container) else None
         if isinstance(wrapper, IteratorWrapper):
             wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

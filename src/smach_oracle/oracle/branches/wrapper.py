@@ -197,7 +197,7 @@ class ContainerWrapper:
     def states(self) -> Iterator[Tuple[str, smach.State]]:
         """Yield the user's states by label."""
         children: Mapping[str, Optional[smach.State]] = self.container.get_children()
-        yield from ((label, state) for label, state in list(children.items()) if state is not None)
+        yield from ((label, state) for label, state in dict(children).items() if state is not None)
 
     def __getstate__(self) -> Dict[str, object]:
         state = dict(self.__dict__, _is_in_use=False, runners={})

@@ -197,7 +197,7 @@ class UserdataFacts:
         `data`: the userdata. `reached`: keys whose values may have changed inside. None means all.
         """
         known = self._known
-        for key, value in list(data.items()):
+        for key, value in dict(data).items():
             before = known.get(key)
             if (
                 before is not None

@@ -113,7 +113,7 @@ class ContainerRecords:
 
     def learned(self) -> Dict[str, object]:
         """Return what was learned of each state that is there, as plain data."""
-        return {label: record.learned() for label, record in list(self.by_label.items())}
+        return {label: record.learned() for label, record in dict(self.by_label).items()}
 
     def take_over(
         self, label: str, settings: StateSettings, learned: Mapping[str, object], is_shared: bool

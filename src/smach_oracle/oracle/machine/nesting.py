@@ -93,11 +93,12 @@ def children_of(container: object) -> Mapping[str, smach.State]:
 def _containers_of(container: object) -> List[Tuple[str, smach.Container]]:
     """Return those of its states that are containers, by label.
 
-    Another thread may add states meanwhile. To make a list of all is one step to it.
+    Another thread may add states meanwhile. A copy is one step to it. A list of pairs is not: each
+    pair is a new object, for which Python may collect garbage, and that runs code.
     """
     return [
         (label, state)
-        for label, state in list(children_of(container).items())
+        for label, state in dict(children_of(container)).items()
         if isinstance(state, smach.Container)
     ]
 
@@ -115,7 +116,7 @@ def paths_below(container: object, above: Labels = ()) -> Iterator[str]:
 
     These are the machines in a container, and the plain states of its Concurrences and Iterators.
     """
-    for label, state in list(children_of(container).items()):
+    for label, state in dict(children_of(container)).items():
         path = above + (label,)
         is_branch = (
             not isinstance(container, smach.StateMachine)

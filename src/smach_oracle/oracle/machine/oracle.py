@@ -246,14 +246,14 @@ class Oracle:
         rows = []
         for node in nodes_of(self._node.machine):
             path = node.path
-            for label, record in list(node.records.by_label.items()):
+            for label, record in dict(node.records.by_label).items():
                 rows += [
                     TransitionRow(path, label, outcome, target, count)
                     for (outcome, target), count in record.transitions().items()
                 ]
             rows += [
                 TransitionRow(path, node.settings.oracle_label, target, target, count)
-                for target, count in list(node.records.oracle_edges.items())
+                for target, count in dict(node.records.oracle_edges).items()
             ]
         return rows
 

@@ -195,7 +195,7 @@ def _done_below(node: TreeNode) -> Iterator[_Done]:
     """Yield the guarded states at or below a container that were executed."""
     for each in nodes_of(node.machine):
         path = each.path[len(node.path) + 1 :]
-        for label, record in list(each.records.by_label.items()):
+        for label, record in dict(each.records.by_label).items():
             mark = each.records.marks[label]
             if mark.done and record.settings.on_retry != ALLOW:
                 yield _Done('{}/{}'.format(path, label) if path else label, mark)

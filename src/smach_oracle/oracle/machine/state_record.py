@@ -307,7 +307,7 @@ class StateRecord:
     def transitions(self) -> Dict[Tuple[str, str], int]:
         """Return how often each (outcome, target) was taken."""
         counts = self._edges.copy()
-        for outcome, edge in list(self.fast.items()):
+        for outcome, edge in dict(self.fast).items():
             counts[outcome, edge.leads_to] += edge.count
         return counts
 

@@ -119,7 +119,7 @@ def _merge(
     done: List[Callable[[], None]] = []
     for learner in learners:
         states = containers.setdefault(learner.relative_path, {})
-        for label, record in list(learner.records.by_label.items()):
+        for label, record in dict(learner.records.by_label).items():
             before = written = record.learned()
             if label in states:
                 try:

@@ -49,7 +49,7 @@ class VisitMarks(Dict[str, VisitMark]):
         """Return labels and marks as plain data."""
         return [
             (label, [mark.reached, mark.executed, mark.done, mark.spent])
-            for label, mark in list(self.items())
+            for label, mark in dict(self).items()
         ]
 
 

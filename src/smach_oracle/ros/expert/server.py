@@ -261,7 +261,7 @@ class ExpertQueryServer:
 
     def _close_abandoned(self, now_s: float) -> None:
         connections = self._action.status_pub.impl.connections
-        for query_id, askers in list(self._askers.items()):
+        for query_id, askers in dict(self._askers).items():
             if all([asker.missing_s(connections, now_s) >= self._asker_gone_s for asker in askers]):
                 self._questions.close(query_id, 'the asker is gone')
 

@@ -81,7 +81,7 @@ class HandServer(OwnObserver):
     def forget(self, machine: OracleContainer) -> None:
         """Take the hand off a machine that is about to come out of its oracle."""
         remove_identical(oracle_of(machine).events.observers, self._observer)
-        for path, known in list(self._machines.items()):
+        for path, known in dict(self._machines).items():
             if known() is machine:
                 del self._machines[path]
         self._status.changed()

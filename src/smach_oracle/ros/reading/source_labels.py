@@ -69,7 +69,7 @@ def _texts_of_program() -> Tuple[Set[str], Set[str]]:
 
 
 def _loaded_files() -> Iterator[str]:
-    for name, module in list(sys.modules.items()):
+    for name, module in dict(sys.modules).items():
         path = getattr(module, '__file__', None)
         if name.split('.')[0] not in _OTHERS and isinstance(path, str) and path:
             yield path

@@ -177,11 +177,11 @@ class Teleoperation:
 
     def write_sections(self) -> None:
         """Bring the sections up to date. End the sessions of pages that have fallen silent."""
-        for key, client in list(self._clients.items()):
+        for key, client in dict(self._clients).items():
             if client.control.session is not None and client.control.silent(time.monotonic()):
                 self._leave(key, None, 'the page has fallen silent')
         self._sections.put(
-            'manipulation', {key: _view(client) for key, client in list(self._clients.items())}
+            'manipulation', {key: _view(client) for key, client in dict(self._clients).items()}
         )
         self._sections.put(
             'interface_output',

@@ -97,7 +97,7 @@ class FollowedRobots:
                     seen.add(topic[: -len(suffix)])
         for name in sorted(seen - set(self._robots)):
             self._begin(name)
-        for name, robot in list(self._robots.items()):
+        for name, robot in dict(self._robots).items():
             if name in seen:
                 publishers = frozenset(
                     node for suffix in _TOPICS for node in nodes.get(name + suffix, ())
@@ -123,8 +123,12 @@ class FollowedRobots:
     def holdable(self) -> Dict[str, FrozenSet[str]]:
         """Return the robots whose machines can be held, each with the paths of its containers."""
         with self._lock:
-            robots = list(self._robots.items())
-        return {name: robot.containers() for name, robot in robots if robot.machines is not None}
+            robots = self._robots.copy()
+        return {
+            name: robot.containers()
+            for name, robot in robots.items()
+            if robot.machines is not None
+        }
 
     def write_sections(self) -> None:
         """Bring the sections up to date."""
