@@ -30,6 +30,10 @@ def said(text):
 
 
 def process(method, ending, waits=True):
+    said(ended_process(method, ending, waits).exitcode)
+
+
+def ended_process(method, ending, waits=True):
     context = multiprocessing.get_context(method)
     begun = context.Event()
     child = context.Process(target=sleep, args=(begun,), daemon=True)
@@ -38,7 +42,7 @@ def process(method, ending, waits=True):
         begun.wait()
     getattr(child, ending)()
     child.join()
-    said(child.exitcode)
+    return child
 
 
 def begin_and_sleep(begun):
@@ -162,13 +166,20 @@ class ChildGoesOn(Exception):
 
 def threads_fork():
     """Other threads fork and end children while the machine runs."""
-    threads = [
-        threading.Thread(target=process, args=('fork', 'terminate', False)) for _ in range(8)
-    ]
+    children = []
+
+    def fork():
+        children.append(ended_process('fork', 'terminate', False))
+
+    threads = [threading.Thread(target=fork) for _ in range(8)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
+    # only now: multiprocessing waits for all children wherever one is started, and a thread that
+    # finds its own gone may ask for the exit code before the other thread has noted it
+    for child in children:
+        said(child.exitcode)
 
 
 KINDS = {
