@@ -125,9 +125,7 @@ class FollowedRobots:
         with self._lock:
             robots = self._robots.copy()
         return {
-            name: robot.containers()
-            for name, robot in robots.items()
-            if robot.machines is not None
+            name: robot.containers() for name, robot in robots.items() if robot.machines is not None
         }
 
     def write_sections(self) -> None:
