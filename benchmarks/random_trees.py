@@ -26,6 +26,7 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / 'test' / 'unit' / 'support'))
 
 MOST_SHOWN = 5
+TREES, CHECKED = 500, 200  # the second with --check. Unit tests execute those of seeds 0 to 199
 
 
 def main() -> int:
@@ -68,14 +69,19 @@ def main() -> int:
 def parse_arguments() -> argparse.Namespace:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.split('\n')[0])
-    parser.add_argument('--trees', type=int, default=500, help='(default: %(default)s)')
     parser.add_argument(
-        '--seed', type=int, default=0, help='of the first tree (default: %(default)s)'
+        '--trees', type=int, help='(default: {}, with --check {})'.format(TREES, CHECKED)
+    )
+    parser.add_argument(
+        '--seed', type=int, default=200, help='of the first tree (default: %(default)s)'
     )
     parser.add_argument('--only', metavar='SEED', help='try the tree of this seed alone')
     parser.add_argument('--upstream', metavar='PATH', help='folder with an upstream smach')
     parser.add_argument('--check', action='store_true', help='fail where anything is wrong')
-    return parser.parse_args()
+    given = parser.parse_args()
+    if given.trees is None:
+        given.trees = CHECKED if given.check else TREES
+    return given
 
 
 def try_tree(seed: Any, is_upstream: bool, counts: Counter[str]) -> None:

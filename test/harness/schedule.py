@@ -1,9 +1,11 @@
 """Which checks run side by side, and in which order.
 
 Rostests wait most of their time: for nodes that start, for time to pass, for masters that come
-back. All others compute. Three that wait run beside two that compute. Tests and linters that
-compute give way (`processes.NICE`), so that a rostest finds the machine almost idle, and hardly
-ever a core is idle. Benchmarks of wall-clock time run alone, at the end.
+back. All others compute, and some of them wait as well: for processes that they kill, for the disk.
+Three that wait run beside three that compute. Tests and linters that compute give way
+(`processes.NICE`), so that a rostest finds the machine almost idle, and hardly ever a core is idle:
+beside two that compute a fifth of both cores was. Benchmarks of wall-clock time run alone, at the
+end.
 """
 
 import sys
@@ -15,9 +17,16 @@ from checks import Bench, Check
 from report import Outcome, show
 
 COMPUTES, WAITS, ALONE = 'computes', 'waits', 'alone'
-# what each worker takes: the second kind where none of the first is left. So three compute side by
+# what each worker takes: the second kind where none of the first is left. So four compute side by
 # side at most
-WORKERS = ((COMPUTES, WAITS), (WAITS, COMPUTES), (COMPUTES, WAITS), (WAITS,), (WAITS,))
+WORKERS = (
+    (COMPUTES, WAITS),
+    (WAITS, COMPUTES),
+    (COMPUTES, WAITS),
+    (COMPUTES, WAITS),
+    (WAITS,),
+    (WAITS,),
+)
 MORE = (WAITS, COMPUTES)
 # benchmarks that need no machine of their own: they count faults or memory, take processor time, or
 # hold the best of many rounds against a yardstick of the same run

@@ -127,12 +127,12 @@ def test_the_processor_time_is_that_of_the_command_and_of_all_that_it_waits_for(
     assert not hung.ok and hung.processor_s > 0.1
 
 
-def test_two_compute_three_wait_and_at_most_three_compute_at_the_end():
-    names = ['ruff', 'rostest/a', 'unit/x', 'unit/y', 'rostest/b', 'upstream/rostest/c']
+def test_three_compute_three_wait_and_at_most_four_compute_at_the_end():
+    names = ['ruff', 'rostest/a', 'unit/x', 'mypy', 'unit/y', 'rostest/b', 'upstream/rostest/c']
     queues = schedule.Queues(names)
     first, second, *_, last = schedule.WORKERS
     taken = [queues.take(each) for each in schedule.WORKERS]
-    assert taken == ['ruff', 'rostest/a', 'unit/x', 'rostest/b', names[5]]
+    assert taken == ['mypy', 'rostest/a', 'ruff', 'unit/x', 'rostest/b', names[-1]]
     assert [queues.take(each) for each in (last, second, last)] == ['', 'unit/y', '']
     queues = schedule.Queues(names[:2])
     assert [queues.take(first) for _ in range(3)] == ['ruff', 'rostest/a', '']
@@ -142,7 +142,7 @@ def test_benchmarks_of_the_walls_time_run_alone_at_the_end():
     there = benchmark_checks(ROOT)
     assert set(schedule.BESIDE_OTHERS) <= set(there)
     (beside, jobs), (alone, one) = schedule.rows_of({**there, 'rostest/a': None, 'unit/x': None})
-    assert set(beside) == {'rostest/a', 'unit/x', *schedule.BESIDE_OTHERS} and jobs == 5
+    assert set(beside) == {'rostest/a', 'unit/x', *schedule.BESIDE_OTHERS} and jobs == 6
     assert set(alone) == set(there) - set(beside) and one == 1
     queues = schedule.Queues(list(alone))
     assert sorted(iter(lambda: queues.take(schedule.WORKERS[0]), '')) == sorted(alone)
