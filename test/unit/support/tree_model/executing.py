@@ -46,13 +46,21 @@ class Executed:
         OracleContainer.wrap(
             self.machine,
             name=TOP,
-            settings=settings_of(plan),
+            settings=self.settings(),
             preconditions=self._checks(),
-            expert=DrawnExpert(self.world) if plan.has_expert else None,
+            expert=self.expert(),
         )
         for node in nodes_of(self.machine):
             _InTurn.take_over(self.world, node)
         self.machine.events.observers.append(self._observe)
+
+    def settings(self) -> Dict[str, Any]:
+        """As `wrap` takes them."""
+        return settings_of(self.plan)
+
+    def expert(self) -> Optional[Expert]:
+        """Who is asked."""
+        return DrawnExpert(self.world) if self.plan.has_expert else None
 
     def execute(self) -> str:
         """One trial; returns the outcome, or '' where it raises."""

@@ -1,0 +1,313 @@
+"""Trees drawn at random, and all that they tell. test/data/pinned/trees.txt has the digests of it.
+
+    python3 test/unit/support/pinned_trees.py FOLDER
+
+writes what each tree tells to FOLDER, and all digests to the file. What users see of a change is
+the difference of two folders, of before and after it.
+"""
+
+import contextlib
+import enum
+import hashlib
+import json
+import random
+import re
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterator, List, Optional
+
+HERE = Path(__file__).resolve().parent
+if __name__ == '__main__':
+    sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
+
+from fake_clock import FakeClock
+from killed_machines import Points, in_a_process
+from pinned import ADDRESS, FOLDER, SECONDS
+from tree_model.answers import draw_reply
+from tree_model.drawing import UPSTREAM, Shape, draw
+from tree_model.executing import Executed, answer_of, options_of
+from tree_model.plan import TreePlan
+
+import smach
+from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
+from smach_oracle.oracle.checkpoint.stored_tree import read_tree
+from smach_oracle.oracle.decision.policies import POLICIES
+from smach_oracle.oracle.machine.nesting import records_of
+from smach_oracle.oracle.machine.oracle import oracle_of
+from smach_oracle.oracle.prospects import prospects_of
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.store.codecs import CODECS
+from smach_oracle.store.store_file import StoreFile
+
+TREES, KILLED = 160, 40
+IN_ORDER = Shape(depth=3, concurrent=False, time_limits=False)  # one thing at a time
+BESIDE = UPSTREAM._replace(depth=3, time_limits=False)  # in every fourth tree
+TRIALS = 3
+RESUMES = ('recover', 'ask', 'recover', 'restart')
+# by the first word of a line; all others are events
+KINDS = dict(
+    {'QUESTION': 'questions', 'INTERFACE': 'questions', '=': 'outcomes', 'PROSPECT': 'prospects'},
+    **dict.fromkeys(('INFO', 'WARN', 'ERR'), 'log'),
+    **dict.fromkeys(('RATES', 'TRANSITIONS', 'WAYS'), 'learned'),
+    **dict.fromkeys(('MOMENT', 'WHOLE', 'CONTAINER'), 'store'),
+)
+# held elsewhere, or never the same
+NOT_TOLD = (
+    'settings',
+    'failure_rule',
+    'origin',
+    'trial_id',
+    'seq',
+    'wall_time',
+    'query_id',
+    'question_id',
+    'minutes',
+)
+KEY = re.compile(r'"(\w+)": ')
+ID = re.compile(r'\b[0-9a-f]{12}\b')
+QUESTION = re.compile(r'#-\d+')
+CUT_AT = ('Traceback (most', ' with userdata:', 'InvalidStateError: A ')  # each engine's own
+NUMBER = re.compile(r'-?\d+\.\d+(?:e-?\d+)?')
+
+
+class Told(Executed):
+    """A tree under an oracle; `lines` has all that it tells."""
+
+    def __init__(self, plan: TreePlan, **settings: Any) -> None:
+        self.lines: List[str] = []
+        self._more = settings
+        super().__init__(plan)
+        oracle_of(self.machine).clock = FakeClock()
+        self.machine.events.observers.append(self._tell)
+
+    def settings(self) -> Dict[str, Any]:
+        return dict(super().settings(), **self._more)
+
+    def expert(self) -> Optional[Expert]:
+        return _Asked(self) if self.plan.has_expert else None
+
+    def _tell(self, event: Any) -> None:
+        place = '/'.join(filter(None, (event.path, event.state)))
+        self.tell(
+            '{:15} {}'.format(event.kind.name, place), event._replace(kind=0, path='', state='')
+        )
+
+    def tell(self, what: str, value: Any) -> None:
+        """Add a line."""
+        self.lines.append('{} {}'.format(what, _written(value)).rstrip())
+
+    def run(self, trials: int) -> None:
+        """Execute it as often, and tell what is known of it then."""
+        with _logged(self.tell):
+            for _ in range(trials):
+                self.lines.append('= {}'.format(self.execute()))
+            self.tell('RATES', self.machine.rates())
+            self.tell('TRANSITIONS', sorted(self.machine.transition_counts()))
+            for record in records_of(self.machine._oracle):
+                self.tell('WAYS ' + record.label, record.ways_so_far())
+
+
+class _Asked(Expert):
+    """Answers what is drawn, and tells what it is asked."""
+
+    def __init__(self, told: Told) -> None:
+        self._told = told
+        self._asked = 0
+
+    def ask(self, question: Any, cancelled: Any, progress: Any) -> Optional[Answer]:
+        self._asked += 1
+        self._told.tell('QUESTION', question)
+        path, label = question.container_path, question.failed_state
+        plan = self._told.plan
+        chance = random.Random('{} by hand {}'.format(plan.seed, self._asked))
+        if question.interfaces and chance.random() < 0.4:
+            return Answer(AnswerKind.INTERFACE, interface=question.interfaces[0].name)
+        reply = draw_reply(plan, path, label, self._asked, options_of(question))
+        return reply and answer_of(reply)
+
+    def run_interface(
+        self, offer: Any, question: Any, cancelled: Any, progress: Any
+    ) -> Optional[Answer]:
+        self._told.tell('INTERFACE', offer)
+        if self._asked % 3 == 0:
+            return None
+        return Answer(AnswerKind.SUPERSEDE, outcome=question.supersede_outcomes[0].outcome)
+
+
+def plan_of(number: int, shape: Shape = IN_ORDER) -> TreePlan:
+    """The plan of a tree. All policies have their turn."""
+    names = sorted(POLICIES)
+    return draw('pinned {}'.format(number), shape)._replace(policy=names[number % len(names)])
+
+
+def is_beside(number: int) -> bool:
+    """Whether a tree may have Concurrences."""
+    return number % 4 == 3
+
+
+def tell(number: int) -> List[str]:
+    """Return what a tree tells in some trials, and what it may do by `prospects_of`."""
+    interfaces = {'hand': {'action': 'hand/assist'}}
+    plan = plan_of(number, BESIDE if is_beside(number) else IN_ORDER)
+    told = Told(plan, **({'interfaces': interfaces} if number % 3 == 0 else {}))
+    told.run(TRIALS)
+    for each in prospects_of(told.machine):
+        told.tell('PROSPECT', each._replace(settings=None))
+    return sorted(told.lines) if is_beside(number) else told.lines
+
+
+def tell_killed(number: int, folder: Path) -> List[str]:
+    """Return what is in the store of a tree that was killed at one of its events, and what the
+    tree tells when it is begun again.
+    """
+    plan = plan_of(number)
+    settings = {
+        'checkpoint': str(folder / 'robot.db'),
+        'checkpoint_synchronous': 'OFF',
+        'checkpoint_wait_s': 60,
+        'on_resume': RESUMES[number % len(RESUMES)],
+    }
+
+    def events() -> int:
+        told = Told(plan)
+        told.run(1)
+        return sum(line.split()[0] in EventKind.__members__ for line in told.lines)
+
+    dies_at = random.Random(plan.seed + ' killed').randrange(2, in_a_process(events) + 1)
+
+    def killed() -> None:
+        told = Told(plan, **settings)
+        told.machine.events.observers.append(Points(dies_at))
+        told.run(1)
+
+    def resumed() -> List[str]:
+        told = Told(plan, **settings)
+        told.run(2)
+        return told.lines
+
+    assert in_a_process(killed) is None
+    stored = _stored(str(folder / 'robot.db'))
+    return stored + [line.replace(str(folder), '.') for line in in_a_process(resumed)]
+
+
+def _stored(path: str) -> List[str]:
+    """The moments of the last trial in a store, and what they come to."""
+    store = StoreFile(path, 'OFF')
+    try:
+        (trial,) = store.trials()
+        lines = [
+            'MOMENT {} {}'.format(each.seq, _written(each._replace(at=0)))
+            for each in store.moments(trial.number)
+        ]
+        tree = read_tree(store, trial.number, CODECS)
+        lines += [
+            'WHOLE {} {}'.format(name, _written(value))
+            for name, value in sorted(tree.whole.items())
+            if name not in NOT_TOLD
+        ]
+        lines += [
+            'CONTAINER {} {}'.format(name, _written(vars(container)))
+            for name, container in sorted(tree.containers.items())
+        ]
+        return lines
+    finally:
+        store.close()
+
+
+def _written(value: Any) -> str:
+    text = json.dumps(_plain(value), ensure_ascii=False)
+    text = '' if text == '{}' else KEY.sub(r'\1: ', text)
+    for pattern, name in ((SECONDS, '# s'), (ADDRESS, ''), (ID, '#')):
+        text = pattern.sub(name, text)
+    return NUMBER.sub(_rounded, text)
+
+
+def _rounded(found: Any) -> str:
+    return '{:.3f}'.format(float(found.group()))
+
+
+def _is_told(key: str) -> bool:
+    return key not in NOT_TOLD and not key.endswith('_s')
+
+
+def _plain(value: Any) -> Any:
+    """Plain data of a value. What a tuple with names has for nothing is left out."""
+    if isinstance(value, enum.Enum):
+        return value.name
+    if hasattr(value, '_asdict'):
+        value = {
+            key: each
+            for key, each in value._asdict().items()
+            if _is_told(key) and each not in ('', None, (), 0) and each == each
+        }
+    if hasattr(value, 'keys'):
+        return {
+            str(key): _plain(value[key])
+            for key in sorted(value.keys(), key=str)
+            if _is_told(str(key))
+        }
+    if isinstance(value, (set, frozenset)):
+        value = sorted(value)
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    if isinstance(value, str):
+        for cut in CUT_AT:
+            value = value.split(cut)[0]
+        return value
+    return value if isinstance(value, (int, float, type(None))) else type(value).__name__
+
+
+@contextlib.contextmanager
+def _logged(note: Callable[[str, str], None]) -> Iterator[None]:
+    """Pass on what the executive logs, not what an engine does."""
+    names = ('loginfo', 'logwarn', 'logerr')
+    before = {name: getattr(smach, name) for name in names}
+
+    def noting(name: str) -> Callable[[Any], None]:
+        def log(text: Any) -> None:
+            if sys._getframe(1).f_globals['__name__'].startswith('smach_oracle'):
+                if not str(text).startswith('State machine transitioning'):  # as an event says
+                    note(name[3:].upper(), str(text))
+
+        return log
+
+    for name in names:
+        setattr(smach, name, noting(name))
+    try:
+        yield
+    finally:
+        for name in names:
+            setattr(smach, name, before[name])
+
+
+def digests(lines: List[str]) -> str:
+    """A digest of each kind of lines, and the kinds."""
+    kinds: Dict[str, Any] = {}
+    for line in lines:
+        kind = KINDS.get(line.split(maxsplit=1)[0], 'events')
+        kinds.setdefault(kind, hashlib.sha256()).update(line.encode() + b'\n')
+    return ' '.join('{} {}'.format(kind, kinds[kind].hexdigest()[:10]) for kind in sorted(kinds))
+
+
+def write(folder: Path) -> None:
+    """Write what all trees tell, a file each, and the digests."""
+    folder.mkdir(exist_ok=True)
+    told = {name_of(number): tell(number) for number in range(TREES)}
+    for number in range(KILLED):
+        with tempfile.TemporaryDirectory() as store:
+            told[name_of(number, 'killed')] = tell_killed(number, Path(store))
+    for name, lines in told.items():
+        (folder / (name + '.txt')).write_text('\n'.join(lines) + '\n', 'utf-8')
+    (FOLDER / 'trees.txt').write_text(
+        ''.join('{} {}\n'.format(name, digests(lines)) for name, lines in told.items()), 'utf-8'
+    )
+
+
+def name_of(number: int, what: str = 'tree') -> str:
+    """The name of a tree in the file of digests."""
+    return '{}_{:03}'.format(what, number)
+
+
+if __name__ == '__main__':
+    write(Path(sys.argv[1]))
