@@ -35,7 +35,7 @@ class Place(smach.State):
     def __init__(self):
         smach.State.__init__(self, ['succeeded'], ['cup'])
     def execute(self, userdata):
-        print('PLACES', userdata.cup, flush=True)
+        print('PLACES {}'.format(userdata.cup), flush=True)
         while not os.path.exists(sys.argv[1]):
             time.sleep(0.05)
         return 'succeeded'
@@ -44,7 +44,7 @@ sm.userdata.cup = '<b>red</b>'
 with sm:
     smach.StateMachine.add('PICK', Pick(), {'succeeded': 'PLACE'})
     smach.StateMachine.add('PLACE', Place(), {'succeeded': 'succeeded'})
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 DOWN = '.down-machine[data-machine=TASK]'
 GO_ON, CHANGE, DROP = (

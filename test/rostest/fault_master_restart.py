@@ -25,7 +25,7 @@ class Fails(smach.State):
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('PICK', Fails())
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 sys.stdin.readline()
 """
 # A front end that knows nothing of what was before: finds the server, waits for a question, answers
@@ -51,7 +51,7 @@ import rospy
 from smach_oracle.msg import OracleEvent
 rospy.init_node('listener')
 events = rospy.Subscriber('/task/oracle/events', OracleEvent,
-                          lambda event: print('EVENT', event.kind, flush=True))
+                          lambda event: print('EVENT {}'.format(event.kind), flush=True))
 while not events.get_num_connections():
     rospy.sleep(0.05)
 print('LISTENING', flush=True)

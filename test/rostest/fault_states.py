@@ -30,7 +30,7 @@ class Odd(smach.State):
         self.visits = 0
     def execute(self, userdata):
         self.visits += 1
-        print('VISIT', self.visits, flush=True)
+        print('VISIT {}'.format(self.visits), flush=True)
         return self.first() if self.visits == 1 else 'succeeded'
 def raises():
     raise RuntimeError('the gripper is not calibrated')
@@ -45,7 +45,7 @@ with sm:
     smach.StateMachine.add('PLACE', Odd(lambda: 'succeeded'))
 print('WAITS', flush=True)
 sys.stdin.readline()
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 if sys.argv[2:] == ['stay']:
     sys.stdin.readline()
 '''
@@ -68,7 +68,7 @@ while not ready():
     time.sleep(0.02)
 print('WAITS', flush=True)
 sys.stdin.readline()
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 # Takes each goal and does nothing with it, unless told to succeed.
 SILENT_SERVER = """

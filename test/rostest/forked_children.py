@@ -39,7 +39,7 @@ class Plan(smach.State):
             child = os.fork()
             if not child:
                 sys.exit(3)
-            print('CHILD', os.waitpid(child, 0)[1], flush=True)
+            print('CHILD {}'.format(os.waitpid(child, 0)[1]), flush=True)
             return 'succeeded'
         context = multiprocessing.get_context('fork')
         begun = context.Event()
@@ -49,7 +49,7 @@ class Plan(smach.State):
         begun.wait()
         child.terminate() if how == 'terminated' else child.kill()
         child.join()
-        print('CHILD', child.exitcode, flush=True)
+        print('CHILD {}'.format(child.exitcode), flush=True)
         return 'succeeded'
 class Drive(smach.State):
     def __init__(self):
@@ -62,7 +62,7 @@ sm = smach.StateMachine(outcomes=['succeeded', 'preempted'])
 with sm:
     smach.StateMachine.add('PLAN', Plan(), {'succeeded': 'DRIVE'})
     smach.StateMachine.add('DRIVE', Drive())
-print('OUT', sm.execute(), flush=True)
+print('OUT {}'.format(sm.execute()), flush=True)
 """
 # how a child ends, and the status that its parent gets
 ENDS = {'exits': 'CHILD 768', 'terminated': 'CHILD 0', 'killed': 'CHILD -9'}

@@ -40,7 +40,7 @@ sm = smach.StateMachine(['succeeded', 'aborted'])
 with sm:
     smach.StateMachine.add('ALL', polish, {'succeeded': 'BOTH'})
     smach.StateMachine.add('BOTH', both)
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 '''
 SETTINGS = {
     'states': {'ALL/*': {'max_recoveries': 0}, 'BOTH/LIFT': {'max_recoveries': 0}},

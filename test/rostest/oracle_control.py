@@ -25,7 +25,7 @@ class Work(smach.State):
         smach.State.__init__(self, outcomes=['succeeded'])
         self.label, self.waits = label, waits
     def execute(self, ud):
-        print('RUNS', self.label, flush=True)
+        print('RUNS {}'.format(self.label), flush=True)
         if self.waits:
             sys.stdin.readline()
         return 'succeeded'
@@ -40,12 +40,12 @@ with sm:
     smach.StateMachine.add('LAST', Work('LAST'))
 """
 EXECUTE = """
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 OWN_SERVER = """
 sis = smach_ros.IntrospectionServer('viewed', sm, '/SHOWN')
 sis.start()
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 sis.stop()
 """
 GUARDED = '{states: {FIRST: {on_retry: confirm}}}'

@@ -20,7 +20,7 @@ rospy.init_node('task')
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('MOVE', smach_ros.SimpleActionState('move', MoveArmsAsideAction))
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 
 

@@ -27,7 +27,7 @@ rospy.init_node('task')
 sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
 with sm:
     smach.StateMachine.add('DRIVE', smach_ros.SimpleActionState('drive', MoveArmsAsideAction))
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 # of diagnostic_msgs, which need not be installed: then the task reads it by this definition
 DEFINITION = """Header header

@@ -36,7 +36,7 @@ A_TREE = (
     PRELUDE
     + """
 sm = OracleContainer.wrap(chain(*[chain(step()) for _ in range(30)]), name='TREE')
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 names = [thread.name for thread in threading.enumerate()]
 print('INTROSPECTION', sum('introspection' in name for name in names),
       'PUBLISHERS', sum('_publisher' in name for name in names), flush=True)
@@ -50,7 +50,7 @@ sm = chain(step())
 viewer = smach_ros.IntrospectionServer('mine', sm, '/MINE')
 viewer.start()
 viewer.stop()
-print('OUTCOME', OracleContainer.wrap(sm, name='TREE').execute(), flush=True)
+print('OUTCOME {}'.format(OracleContainer.wrap(sm, name='TREE').execute()), flush=True)
 sys.stdin.readline()
 """
 )
@@ -71,7 +71,7 @@ inner = OracleContainer.wrap(chain(step(), step()), name='INNER')
 sm = chain(inner)
 viewer = smach_ros.IntrospectionServer('task', sm, '/OUTER')
 viewer.start()
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 sys.stdin.readline()
 viewer.stop()
 """
@@ -84,11 +84,11 @@ viewer = smach_ros.IntrospectionServer('mine', sm, '/SM_ROOT')
 if WHEN == 'before':
     viewer.start()
 OracleContainer.wrap(sm, name='TREE')
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 if WHEN == 'after':
     viewer.start()
 sys.stdin.readline()
-print('AGAIN', sm.execute(), flush=True)
+print('AGAIN {}'.format(sm.execute()), flush=True)
 sys.stdin.readline()
 viewer.stop()
 """

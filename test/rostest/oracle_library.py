@@ -36,7 +36,7 @@ class Turn(smach.State):
         return self.left.pop(0) if self.left else 'succeeded'
 OUTCOMES = ['succeeded', 'aborted', 'preempted']
 def run(sm):
-    print('OUTCOME', sm.execute(), flush=True)
+    print('OUTCOME {}'.format(sm.execute()), flush=True)
     sys.stdin.readline()
 """
 WRAPPED_BEFORE_THE_NODE = (
@@ -61,7 +61,7 @@ with sm:
     OracleContainer.add('PICK', Turn('aborted'), prior=0.2,
                         preconditions=[lambda userdata: not view.append('looked')])
 run(sm)
-print('LOOKED', len(view), flush=True)
+print('LOOKED {}'.format(len(view)), flush=True)
 """
 )
 FIXED_SETTINGS = (
@@ -85,7 +85,7 @@ with sm:
     smach.StateMachine.add('PICK', smach.CBState(lambda userdata: 'succeeded',
                                                  outcomes=['succeeded']))
 OracleContainer.wrap(sm).execute()
-print('HEARD', any('terminating' in text for text in heard), flush=True)
+print('HEARD {}'.format(any('terminating' in text for text in heard)), flush=True)
 """
 A_NEW_MACHINE_EACH_TRIAL = (
     PRELUDE
@@ -132,7 +132,7 @@ viewer = smach_ros.IntrospectionServer('mine', machines[1], '/SM_PLACE')
 viewer.start()
 for sm in machines:
     sm.execute()
-print('PATHS', [sm.path for sm in machines], flush=True)
+print('PATHS {}'.format([sm.path for sm in machines]), flush=True)
 sys.stdin.readline()
 viewer.stop()
 """
@@ -173,7 +173,7 @@ if 'bare' not in sys.argv:
     for number, sm in enumerate(machines):
         OracleContainer.wrap(sm, settings={'max_recoveries': 0 if number % 2 else 3})
 for sm in machines:
-    print('OUTCOME', sm.execute(), flush=True)
+    print('OUTCOME {}'.format(sm.execute()), flush=True)
 sys.stdin.readline()
 if 'bare' not in sys.argv:
     from smach_oracle.oracle import unwrap

@@ -54,13 +54,13 @@ from smach_oracle.oracle import oracle_of
 oracle_of(sm).events.observers.append(lambda event: time.sleep(0.5))
 """
 RUN = """
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 # rospy has closed the topics by then, and rospy.is_shutdown does not say so yet
 LATE_TRIAL = (
     RUN
     + """
-rospy.core.add_preshutdown_hook(lambda reason: print('LATE', sm.execute(), flush=True))
+rospy.core.add_preshutdown_hook(lambda reason: print('LATE {}'.format(sm.execute()), flush=True))
 rospy.signal_shutdown('the end')
 """
 )

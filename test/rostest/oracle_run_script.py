@@ -29,7 +29,7 @@ with sm:
                            {'succeeded': 'AGAIN'})
     smach.StateMachine.add('AGAIN', smach_ros.SimpleActionState('move', MoveArmsAsideAction))
 for name in sys.argv[1:]:
-    print('OUTCOME', sm.execute(), flush=True)
+    print('OUTCOME {}'.format(sm.execute()), flush=True)
     sys.stdin.readline()
 """
 TWO_TRIALS = ('one', 'two')

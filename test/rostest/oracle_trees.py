@@ -41,8 +41,8 @@ sm = chain(('FIND', chain(('LOOK', Step('LOOK')), ('AIM', Step('AIM')))),
 server = IntrospectionServer('task', sm, '/TASK')
 server.start()
 outcome = sm.execute()
-print('VISITS', ' '.join(visits), flush=True)
-print('OUTCOME', outcome, flush=True)
+print('VISITS {}'.format(' '.join(visits)), flush=True)
+print('OUTCOME {}'.format(outcome), flush=True)
 server.stop()
 """
 

@@ -50,7 +50,7 @@ OracleContainer.wrap(sm, settings=SETTINGS, name='TASK')
 """.format(SETTINGS)
 RUN = """
 print('READY', flush=True)
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 
 

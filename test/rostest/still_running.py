@@ -37,7 +37,7 @@ ONE_ACTION = (
     PRELUDE
     + """
 sm = machine('LOOK', look('look'))
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 )
 TWO_ACTIONS = (
@@ -49,7 +49,7 @@ with both:
     smach.Concurrence.add('LEFT', machine('LOOK_LEFT', look('look')))
     smach.Concurrence.add('RIGHT', machine('LOOK_RIGHT', look('look_right')))
 sm = machine('BOTH', both)
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 )
 # rospy cannot serialise the first goal
@@ -63,7 +63,7 @@ def goal_cb(userdata, goal):
         goals[0].target = 'no point'
     return goals[-1]
 sm = machine('LOOK', look('look', goal_cb=goal_cb))
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 )
 

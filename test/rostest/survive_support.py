@@ -43,7 +43,7 @@ with sm:
     smach.StateMachine.add('MOVE', smach_ros.SimpleActionState(
         'arm', TestAction, goal=TestGoal(int(sys.argv[1]))), {'succeeded': 'TELL'})
     smach.StateMachine.add('TELL', Tell())
-print('OUTCOME', sm.execute(), flush=True)
+print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 SUCCEED = 150  # number of a goal
 EXPERTS = '/experts'
