@@ -1,7 +1,7 @@
-"""All that trees drawn at random tell is as ever, the same for each engine.
+"""What trees drawn at random tell does not change, and is the same for each engine.
 
-A change of the inside leaves it alone. Where users are meant to see a change,
-`python3 test/unit/support/pinned_trees.py FOLDER` writes it anew (test/data/pinned/README.md).
+A change of the inside leaves it alone. Where users are meant to see one,
+`python3 test/unit/support/pinned_trees.py FOLDER` writes all again (test/data/pinned/README.md).
 """
 
 import threading
