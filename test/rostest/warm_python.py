@@ -6,6 +6,7 @@ interpreter is what a test is about, it starts one.
 """
 
 import array
+import gc
 import importlib
 import json
 import os
@@ -204,6 +205,9 @@ def _become(request: Dict[str, Any]) -> Any:
 def _main() -> Any:
     for name in LIBRARIES + tuple(sys.argv[2:]):
         importlib.import_module(name)
+    # as it ends, each program would look through all that was imported here, and copy its memory
+    gc.collect()
+    gc.freeze()
     return _become(_serve(socket.socket(fileno=int(sys.argv[1]))))
 
 
