@@ -48,23 +48,18 @@ def first_said(program):
 
 
 @pytest.fixture
-def under_oracle(tmp_path):
-    """Run a script under oracle_run, with all that a program keeps in files."""
-
-    def run_script(*script):
-        return run(
-            '-c',
-            RUNNER,
-            '--record',
-            str(tmp_path / 'bags'),
-            '--checkpoint',
-            str(tmp_path / 'store'),
-            '--rates-file',
-            str(tmp_path / 'rates'),
-            *script,
-        )
-
-    return run_script
+def kept_in(tmp_path):
+    """What runs a script under oracle_run, with all that a program keeps in files."""
+    return [
+        '-c',
+        RUNNER,
+        '--record',
+        str(tmp_path / 'bags'),
+        '--checkpoint',
+        str(tmp_path / 'store'),
+        '--rates-file',
+        str(tmp_path / 'rates'),
+    ]
 
 
 @pytest.fixture
@@ -90,8 +85,8 @@ def events_of(bag):
 
 
 @pytest.mark.parametrize('kind', sorted(forking_script.KINDS))
-def test_children_start_and_end_as_without_an_oracle(under_oracle, kind, tmp_path):
-    ended = under_oracle(SCRIPT, kind)
+def test_children_start_and_end_as_without_an_oracle(kept_in, warm_python, kind, tmp_path):
+    ended = warm_python.run([*kept_in, SCRIPT, kind], timeout=60, env=ENVIRONMENT)
     assert said(ended) == said(run(SCRIPT, kind)), ended.stderr
     for bag in (tmp_path / 'bags').iterdir():
         seqs = [event.seq for event in events_of(bag)]
@@ -213,10 +208,10 @@ top.execute()
 """
 
 
-def test_a_loop_of_asyncio_hears_its_signals(under_oracle, script):
+def test_a_loop_of_asyncio_hears_its_signals(kept_in, script):
     path = script(ASYNCIO)
     assert (
-        said(under_oracle(path))
+        said(run(*kept_in, path))
         == said(run(path))
         == (["SAID ['usr1', 'term']", 'SAID {}'.format(signal.SIG_DFL), 'SAID -1'], 0)
     )
