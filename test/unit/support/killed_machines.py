@@ -4,6 +4,7 @@ import collections
 import json
 import os
 import signal
+import tempfile
 import threading
 import traceback
 
@@ -16,8 +17,9 @@ from smach_oracle.oracle.records.events import EventKind
 class Points:
     """Counts the points that a machine passes, and kills its process at one of them."""
 
-    def __init__(self, kill_at):
-        self._kill_at = kill_at
+    def __init__(self, kill_at, stop_at=()):
+        """`stop_at`: where it stops until another process has it go on."""
+        self._kill_at, self._stop_at = kill_at, stop_at
         self.passed = 0
         self._lock = threading.Lock()
 
@@ -26,6 +28,8 @@ class Points:
             self.passed += 1
             if self.passed == self._kill_at:
                 os.kill(os.getpid(), signal.SIGKILL)
+            if self.passed in self._stop_at:  # this thread takes it, and all others stop with it
+                signal.pthread_kill(threading.get_ident(), signal.SIGSTOP)
 
 
 class Diary:
@@ -78,23 +82,38 @@ def around(label, container, leads_to, **others):
     return machine
 
 
-def in_a_process(work):
-    """Run `work(tell)` in a process of its own; return what it has told, None if it was killed."""
-    reader, writer = os.pipe()
-    child = os.fork()
-    if not child:
-        try:
-            told = work()
-        except BaseException:
-            told = {'error': traceback.format_exc()}
-        os.write(writer, json.dumps(told).encode())
-        os._exit(0)
-    os.close(writer)
-    with os.fdopen(reader, 'rb') as stream:
+def in_a_process(work, at_stop=None):
+    """Run `work()` in a process of its own; return what it has told, None if it was killed.
+
+    `at_stop()`: called each time that it stops itself, before it goes on.
+    """
+    with tempfile.TemporaryFile() as stream:
+        child = os.fork()
+        if not child:
+            try:
+                told = work()
+            except BaseException:
+                told = {'error': traceback.format_exc()}
+            stream.write(json.dumps(told).encode())
+            stream.flush()
+            os._exit(0)
+        status = _ended(child, at_stop)
+        assert os.WIFEXITED(status) or os.WTERMSIG(status) == signal.SIGKILL
+        stream.seek(0)
         told = stream.read()
-    _, status = os.waitpid(child, 0)
-    assert os.WIFEXITED(status) or os.WTERMSIG(status) == signal.SIGKILL
     return json.loads(told) if told else None
+
+
+def _ended(child, at_stop):
+    """Wait for a process; return its status."""
+    while True:
+        _, status = os.waitpid(child, os.WUNTRACED if at_stop else 0)
+        if not os.WIFSTOPPED(status):
+            return status
+        try:
+            at_stop()
+        finally:
+            os.kill(child, signal.SIGCONT)
 
 
 class KilledMachine:
@@ -117,11 +136,14 @@ class KilledMachine:
             **settings,
         )
 
-    def run(self, kill_at=0, expert=None, **settings):
-        """Execute it in a process of its own, killed at a point, 0: at none."""
+    def run(self, kill_at=0, expert=None, stop_at=(), at_stop=None, **settings):
+        """Execute it in a process of its own, killed at a point, 0: at none.
+
+        `stop_at`: points at which it stops while `at_stop()` is called here.
+        """
 
         def work():
-            points, log = Points(kill_at), []
+            points, log = Points(kill_at, stop_at), []
             for level in ('info', 'warn'):
                 setattr(smach, 'log' + level, log.append)
             machine = OracleContainer.wrap(
@@ -158,4 +180,4 @@ class KilledMachine:
                 ],
             }
 
-        return in_a_process(work)
+        return in_a_process(work, at_stop)

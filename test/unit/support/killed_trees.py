@@ -2,7 +2,7 @@
 
 import shutil
 
-from killed_machines import KilledMachine, Noted
+from killed_machines import Noted
 
 import smach
 
@@ -73,10 +73,6 @@ def tree(diary, points):
         smach.StateMachine.add('NESTED', nested, {'succeeded': 'B'})
         smach.StateMachine.add('B', noted('B'), ENDS)
     return machine
-
-
-def points_of(tmp_path, build):
-    return KilledMachine(make(tmp_path / 'whole'), build).run()['points']
 
 
 def make(folder):

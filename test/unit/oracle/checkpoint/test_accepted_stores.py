@@ -6,7 +6,7 @@ import signal
 import time
 
 import pytest
-from killed_machines import KilledMachine, in_a_process
+from killed_machines import in_a_process
 from test_never_twice import NEVER as POUR_NEVER
 from test_never_twice import ByHand, chain, killed_in, oracle_state
 
@@ -108,18 +108,10 @@ def prune(killed):
     store.close()
 
 
-@pytest.fixture(scope='module')
-def once(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('once') / 'killed'
-    killed_in(folder, CHAIN, 'CARRY', **POUR_NEVER)
-    return folder
-
-
 @pytest.fixture
-def killed(once, tmp_path):
+def killed(tmp_path):
     """A machine that was killed in CARRY, once it had poured."""
-    shutil.copytree(str(once), str(tmp_path / 'killed'))
-    return KilledMachine(tmp_path / 'killed', CHAIN, **POUR_NEVER)
+    return killed_in(tmp_path / 'killed', CHAIN, 'CARRY', **POUR_NEVER)
 
 
 @pytest.mark.parametrize('way', sorted(WAYS))

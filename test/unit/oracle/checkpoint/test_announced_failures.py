@@ -1,7 +1,8 @@
 """A failure that a later state reports, where the program is stopped meanwhile."""
 
-from killed_machines import KilledMachine, Noted
-from killed_trees import ENDS, make, points_of
+from killed_machines import Noted
+from killed_trees import ENDS
+from left_stores import Left
 
 import smach
 
@@ -31,9 +32,9 @@ def reporting(diary, points):
 
 def test_killed_anywhere_the_failed_state_is_recovered_from(tmp_path):
     told_once = 0
-    for point in range(3, points_of(tmp_path, reporting)):
-        killed = KilledMachine(make(tmp_path / 'killed'), reporting)
-        assert killed.run(kill_at=point) is None
+    left = Left(reporting)
+    for point in left.points(3):
+        killed = left.killed_at(point, tmp_path / 'killed')
         before = killed.diary
         has_told = before.count('ends')['REPORT'] == before.count('begins')['WORK'] == 1
         told = killed.run()

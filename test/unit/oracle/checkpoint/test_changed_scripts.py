@@ -1,14 +1,14 @@
 """A machine that was killed goes on in a script whose states have other names or places."""
 
 import contextlib
+import functools
 import io
 import json
-import os
 import re
-import shutil
 
 import pytest
 from killed_machines import KilledMachine, Noted
+from left_stores import Left
 
 import smach
 from smach_oracle.oracle import Expert
@@ -101,25 +101,14 @@ def folder(tmp_path):
     return tmp_path
 
 
-def points_of(folder, build):
-    number = KilledMachine(folder, build).run()['points']
-    anew(folder)
-    return number
+@functools.lru_cache(maxsize=None)
+def left(before):
+    return Left(before)
 
 
-def anew(folder):
-    shutil.rmtree(str(folder))
-    folder.mkdir()
-
-
-def killed_while_it_runs(folder, machine, name):
-    """Kill a machine while a state is under way for the first time."""
-    for point in range(1, 100):
-        anew(folder)
-        machine.run(kill_at=point)
-        if os.path.exists(str(folder / 'diary')) and machine.diary.count('begins')[name]:
-            return
-    raise AssertionError(name + ' never ran')
+def killed_while_it_runs(folder, before, name):
+    """Leave what a machine leaves that is killed while a state runs for the first time."""
+    left(before).killed_at(left(before).first_in(name), folder)
 
 
 def both_scripts(folder, before, after, **settings):
@@ -128,10 +117,9 @@ def both_scripts(folder, before, after, **settings):
 
 def test_renamed_states_go_on_wherever_it_was_killed(folder):
     whole = KilledMachine(folder, RENAMED).run()
-    anew(folder)
-    for point in range(1, points_of(folder, BEFORE) + 1):
-        before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
-        assert before.run(kill_at=point) is None
+    for point in [*left(BEFORE).points(), left(BEFORE).told['points']]:
+        left(BEFORE).killed_at(point, folder)
+        after = KilledMachine(folder, RENAMED, resume_map=MAP)
         told = after.run()
         assert told.get('outcome') == 'succeeded', (point, told)
         begun, ended = after.diary.count('begins'), after.diary.count('ends')
@@ -142,20 +130,18 @@ def test_renamed_states_go_on_wherever_it_was_killed(folder):
         assert set(ended) == {'A', 'LOOK', 'PICK', 'LEFT', 'M1', 'M2', 'Z'}, point
         if begun['A'] == 2:  # it had failed once, and then succeeded: that is kept
             assert told['rates'] == whole['rates'], point
-        anew(folder)
 
 
-def told_at_each_point(folder, before_it, after_it, names):
+def told_at_each_point(folder, before, after_it, names):
     """Yield what the changed script tells, killed before at each point but the last one."""
-    for point in range(1, points_of(folder, before_it)):  # at the last one it has ended
-        before, after = both_scripts(folder, before_it, after_it, resume_map=names)
-        before.run(kill_at=point)
+    for point in left(before).points():
+        left(before).killed_at(point, folder)
+        after = KilledMachine(folder, after_it, resume_map=names)
         told = after.run()
         assert told.get('outcome') == 'succeeded', (point, told)
         begun = after.diary.count('begins')
         assert sum(begun[name] > 1 for name in begun) <= 1 and max(begun.values()) <= 2, point
         yield point, told
-        anew(folder)
 
 
 def test_what_has_moved_into_another_container_goes_on_there(folder):
@@ -170,21 +156,20 @@ def test_what_has_moved_out_of_a_container_goes_on_there(folder):
 
 
 def test_a_moved_state_in_doubt_is_not_repeated_where_it_must_not_be(folder):
-    before, after = both_scripts(
+    after = KilledMachine(
         folder,
-        flat_before,
         nested_after,
         resume_map={'B': 'IN/B', 'C': 'IN/C'},
         states={'IN/C': {'on_retry': 'never'}},
     )
-    killed_while_it_runs(folder, before, 'C')
+    killed_while_it_runs(folder, flat_before, 'C')
     after.run()
     assert after.diary.count('begins')['C'] == 1
 
 
 def test_the_script_that_went_on_is_no_changed_one_later(folder):
     before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
-    before.run(kill_at=points_of(folder, BEFORE) // 2)
+    before.run(kill_at=left(BEFORE).told['points'] // 2)
     after.run(kill_at=2)
     told = KilledMachine(folder, RENAMED).run()  # it needs no map any more
     assert told.get('outcome') == 'succeeded', told
@@ -192,15 +177,13 @@ def test_the_script_that_went_on_is_no_changed_one_later(folder):
 
 def test_killed_once_more_it_still_goes_on(folder):
     """The names are kept from the first moment of the second part on."""
-    points = points_of(folder, BEFORE)
-    for point in range(5, points, 7):
-        before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
-        before.run(kill_at=point)
+    for point in left(BEFORE).points(5, 7):
+        left(BEFORE).killed_at(point, folder)
+        after = KilledMachine(folder, RENAMED, resume_map=MAP)
         for _ in range(3):
             after.run(kill_at=1)  # at its RESUMED event
         told = after.run()
         assert told['outcome'] == 'succeeded', (point, told)
-        anew(folder)
 
 
 def test_an_earlier_moment_of_before_can_still_be_gone_back_to(folder):
@@ -242,20 +225,18 @@ def test_a_label_that_is_not_there_is_named_before_anything_moves(folder, names,
 
 
 def test_without_a_map_a_person_decides_also_where_its_state_is_gone(folder):
-    for point in range(4, points_of(folder, BEFORE), 5):
-        before, after = both_scripts(folder, BEFORE, RENAMED)
-        before.run(kill_at=point)
+    for point in left(BEFORE).points(4, 5):
+        before, after = left(BEFORE).killed_at(point, folder), KilledMachine(folder, RENAMED)
         begun = before.diary.count('begins')
         told = after.run()
         assert told.get('ended_by') == 'kept', (point, told)  # nobody was there to ask
         assert before.diary.count('begins') == begun, point
-        anew(folder)
 
 
 def test_a_map_that_leaves_out_its_state_has_a_person_decide(folder):
     names = {old: new for old, new in MAP.items() if old != 'KITCHEN/LOOK'}
     before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=names)
-    killed_while_it_runs(folder, before, 'LOOK')
+    killed_while_it_runs(folder, BEFORE, 'LOOK')
     begun = before.diary.count('begins')
     told = after.run()
     assert told['ended_by'] == 'kept'
@@ -266,8 +247,8 @@ def test_a_map_that_leaves_out_its_state_has_a_person_decide(folder):
 
 
 def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
-    before, after = both_scripts(folder, flat_before, nested_after)
-    killed_while_it_runs(folder, before, 'D')
+    after = KilledMachine(folder, nested_after)
+    killed_while_it_runs(folder, flat_before, 'D')
     noted = folder / 'question'
 
     class Noting(Expert):
@@ -339,7 +320,7 @@ def test_a_map_that_is_not_needed_any_more_is_not_warned_of(folder):
 
 def test_oracle_state_tells_the_new_names(folder):
     before, after = both_scripts(folder, BEFORE, RENAMED, resume_map=MAP)
-    killed_while_it_runs(folder, before, 'LOOK')
+    killed_while_it_runs(folder, BEFORE, 'LOOK')
     assert 'TOP/KITCHEN/LOOK was under way' in shown(before.store)
     after.run(kill_at=1)
     assert 'TOP/GALLEY/SEE was under way' in shown(before.store)

@@ -5,7 +5,8 @@ import contextlib
 import pytest
 from killed_machines import KilledMachine, Noted
 from killed_trees import ENDS
-from test_never_twice import NEVER, ByHand, Sends, chain, killed_in, look_for, oracle_state
+from left_stores import Left
+from test_never_twice import NEVER, ByHand, Sends, chain, killed_in, oracle_state
 
 import smach
 from smach_oracle.oracle.checkpoint.checkpointer import Checkpointer
@@ -93,8 +94,9 @@ def test_what_may_have_run_meanwhile_is_not_repeated_by_itself(tmp_path, way):
 
 def test_a_fault_before_the_first_state_is_asked_about_as_well(tmp_path, monkeypatch):
     monkeypatch.setattr(Checkpointer, '_begin_trial', fault)
-    killed = look_for(tmp_path / 'killed', chain(*LABELS), 'CARRY', NEVER)
+    left = Left(chain(*LABELS), **NEVER)
     monkeypatch.undo()
+    killed = left.killed_at(left.first_in('CARRY'), tmp_path / 'killed')
     assert killed.run()['ended_by'] == 'kept'
     assert killed.diary.count('begins')['POUR'] == 1
 

@@ -3,8 +3,8 @@
 import itertools
 
 import pytest
-from killed_machines import KilledMachine, around
-from killed_trees import make, points_of
+from killed_machines import around
+from left_stores import Left
 
 import smach
 
@@ -53,21 +53,25 @@ def most_often(killed):
     return sorted(begun[str(list(items))] for items in ITEMS)
 
 
-def test_killed_at_every_point_each_item_ends_and_only_the_one_in_doubt_runs_again(tmp_path):
-    for point in range(1, points_of(tmp_path, three_deep)):
-        killed = KilledMachine(make(tmp_path / 'killed'), three_deep)
-        killed.run(kill_at=point)
+@pytest.fixture(scope='module')
+def left():
+    return Left(three_deep)
+
+
+def test_killed_at_every_point_each_item_ends_and_only_the_one_in_doubt_runs_again(left, tmp_path):
+    for point in left.points():
+        killed = left.killed_at(point, tmp_path / 'killed')
         told = killed.run()
         assert (point, told.get('done')) == (point, [list(items) for items in ITEMS])
         assert most_often(killed) in ([1] * 8, [1] * 7 + [2]), point
 
 
-@pytest.mark.parametrize('second', [2, 3, 4])
-def test_killed_while_it_resumes_it_still_stands_at_its_items(tmp_path, second):
-    for point in range(5, points_of(tmp_path, three_deep)):
-        killed = KilledMachine(make(tmp_path / 'killed'), three_deep)
-        killed.run(kill_at=point)
-        killed.run(kill_at=second)
-        told = killed.run()
-        assert (point, told.get('done')) == (point, [list(items) for items in ITEMS])
-        assert most_often(killed)[-2:] in ([1, 1], [1, 2], [1, 3]), point
+def test_killed_while_it_resumes_it_still_stands_at_its_items(left, tmp_path):
+    seconds = (2, 3, 4)
+    for point in left.points(5):
+        twice = Left(three_deep, begins=left.folder(point), points=seconds)
+        for second in seconds:
+            killed = twice.killed_at(second, tmp_path / 'killed')
+            told = killed.run()
+            assert (point, told.get('done')) == (point, [list(items) for items in ITEMS])
+            assert most_often(killed)[-2:] in ([1, 1], [1, 2], [1, 3]), (point, second)

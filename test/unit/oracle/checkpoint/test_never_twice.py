@@ -3,14 +3,12 @@
 import contextlib
 import functools
 import io
-import pathlib
 import random
-import shutil
-import tempfile
 
 import pytest
 from killed_machines import KilledMachine, Noted
 from killed_trees import ENDS, make, tree
+from left_stores import Left
 
 import smach
 from smach_oracle.oracle import Expert
@@ -82,32 +80,22 @@ FLAT = chain('LOOK', 'POUR', 'CARRY')
 NESTED = nested('LOOK', 'POUR', 'CARRY')
 
 
-# by machine, state and settings: where a program was killed in that state
-KILLED = {}
+# by machine and settings: what it leaves
+LEFT = {}
+
+
+def left(build, settings):
+    """What a machine leaves. With anything patched, make a `Left` of your own."""
+    key = (build, repr(settings))
+    if key not in LEFT:
+        LEFT[key] = Left(build, **settings)
+    return LEFT[key]
 
 
 def killed_in(folder, build, state, **settings):
-    """The machine, killed while a state runs.
-
-    Where to kill it is looked for once, by up to fifteen programs. Each test has a copy of what the
-    last one has left. With anything patched, `look_for` it.
-    """
-    key = (build, state, repr(settings))
-    if key not in KILLED:
-        KILLED[key] = tempfile.TemporaryDirectory()
-        look_for(pathlib.Path(KILLED[key].name, 'killed'), build, state, settings)
-    shutil.rmtree(str(folder), ignore_errors=True)
-    shutil.copytree(str(pathlib.Path(KILLED[key].name, 'killed')), str(folder))
-    return KilledMachine(folder, build, **settings)
-
-
-def look_for(folder, build, state, settings):
-    """Kill the machine at one point after another, until a state had begun."""
-    killed, point = KilledMachine(make(folder), build, **settings), 0
-    while not killed.diary.count('begins')[state] > killed.diary.count('ends')[state]:
-        killed, point = KilledMachine(make(folder), build, **settings), point + 1
-        assert killed.run(kill_at=point) is None, 'it has ended'
-    return killed
+    """The machine, killed while a state runs."""
+    machine = left(build, settings)
+    return machine.killed_at(machine.first_in(state), folder)
 
 
 def oracle_state(killed, *arguments):
@@ -220,9 +208,9 @@ def test_it_is_not_done_twice_under_another_name(tmp_path, after, names, state, 
 
 def test_it_is_not_done_twice_where_the_map_leads_from_what_was_next_to_it(tmp_path):
     """CARRY was next, and is POUR now, by the map."""
-    for point in range(1, 40):
-        before = KilledMachine(make(tmp_path / 'killed'), FLAT, **NEVER)
-        before.run(kill_at=point)
+    machine = left(FLAT, NEVER)
+    for point in [*machine.points(), machine.told['points']]:
+        before = machine.killed_at(point, tmp_path / 'killed')
         if 'TOP/CARRY was next' in oracle_state(before):
             break
     else:  # the moment is stored with the next state: by hand
@@ -241,10 +229,8 @@ def test_a_jump_of_the_expert_is_not_forgotten_by_a_kill(tmp_path, expert):
     """The expert sends the machine back to LOOK, and it is killed there: POUR is spent still."""
     build = chain('LOOK', 'POUR', 'CARRY', failing='CARRY')
     settings = dict(NEVER, max_recoveries=0)
-    killed, point = KilledMachine(make(tmp_path / 'killed'), build, **settings), 0
-    while killed.diary.count('begins')['LOOK'] < 2:
-        killed, point = KilledMachine(make(tmp_path / 'killed'), build, **settings), point + 1
-        assert killed.run(kill_at=point, expert=Sends('LOOK')) is None
+    machine = Left(build, expert=Sends('LOOK'), **settings)
+    killed = machine.killed_at(machine.first_in('LOOK', times=2), tmp_path / 'killed')
     killed.run(max_recoveries=5, expert=expert)
     assert killed.diary.count('begins')['POUR'] == 1
 

@@ -1,8 +1,8 @@
 """Killed as the oracle checks and achieves preconditions and tries again, a machine goes on."""
 
 import pytest
-from killed_machines import KilledMachine, Noted
-from killed_trees import make
+from killed_machines import Noted
+from left_stores import Left
 
 import smach
 
@@ -51,23 +51,16 @@ class Kitchen:
         return machine
 
 
-def kitchen(folder, opens):
-    build = Kitchen(opens)
-    return KilledMachine(
-        make(folder), build, states={'PICK': {'preconditions': build.preconditions}}
-    )
-
-
 @pytest.mark.parametrize('opens', ['label', 'pair'])
 def test_it_comes_to_its_end_and_only_what_was_under_way_runs_again(tmp_path, opens):
-    whole = kitchen(tmp_path / 'whole', opens)
-    told = whole.run()
+    build = Kitchen(opens)
+    left = Left(build, states={'PICK': {'preconditions': build.preconditions}})
+    told = left.told
     assert told['done'] == ['LOOK', 'PICK', 'OPEN', 'PICK', 'PUT']
     assert 'PRECONDITION_END' in [kind for kind, _, _ in told['events']]
-    usual = whole.diary.count('begins')
-    for point in range(1, told['points']):
-        killed = kitchen(tmp_path / 'killed', opens)
-        assert killed.run(kill_at=point) is None
+    usual = dict(LOOK=1, PICK=2, OPEN=1, PUT=1)
+    for point in left.points():
+        killed = left.killed_at(point, tmp_path / 'killed')
         told = killed.run()
         assert told.get('outcome') == 'succeeded', (point, told)
         assert 'OPEN' in told['done'], (point, 'what a precondition has written is lost')

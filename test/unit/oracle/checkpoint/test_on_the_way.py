@@ -1,7 +1,8 @@
 """A machine that is killed on its way to a state in a container below still comes to that state."""
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import Noted
+from left_stores import Left
 
 import smach
 
@@ -28,23 +29,23 @@ def deep(diary, points):
     return top
 
 
-def killed_in_r(folder):
-    """The machine, killed as R was under way for the first time."""
-    for point in range(12, 100):  # before that R does not begin
-        below = folder / str(point)
-        below.mkdir()
-        killed = KilledMachine(below, deep)
-        killed.run(kill_at=point)
-        if killed.diary.count('begins')['R']:
-            return killed
-    raise AssertionError('R never begins')
+SECONDS = tuple(range(1, 12))
 
 
-@pytest.mark.parametrize('second', range(1, 12))
-def test_killed_on_its_way_down_it_begins_no_state_but_the_one_it_was_sent_to(tmp_path, second):
-    killed = killed_in_r(tmp_path)
-    assert killed.run(kill_at=second, on_resume='state:OUTER/INNER/Q') is None
-    told = killed.run()
+@pytest.fixture(scope='module')
+def sent():
+    """Killed in R, then sent to Q, and killed once more."""
+    left = Left(deep)
+    in_r = left.folder(left.first_in('R'))
+    return Left(deep, begins=in_r, points=SECONDS, on_resume='state:OUTER/INNER/Q')
+
+
+@pytest.mark.parametrize('second', SECONDS)
+def test_killed_on_its_way_down_it_begins_no_state_but_the_one_it_was_sent_to(
+    tmp_path, sent, second
+):
+    killed = sent.killed_at(second, tmp_path / 'killed')
+    told = killed.run(on_resume='recover')
     assert told.get('outcome') == 'succeeded', told
     begun = killed.diary.count('begins')
     assert begun['P'] == 1

@@ -5,7 +5,8 @@ import re
 
 import pytest
 from killed_machines import KilledMachine, Noted
-from killed_trees import ALL, ENDS, flat, make, points_of, tree
+from killed_trees import ALL, ENDS, flat, make, tree
+from left_stores import Left
 
 import smach
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
@@ -13,10 +14,15 @@ from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
 
-def test_killed_at_every_point_each_state_ends_and_only_the_one_in_doubt_runs_again(tmp_path):
-    for point in range(1, points_of(tmp_path, tree)):  # at the last one it has ended
-        killed = KilledMachine(make(tmp_path / 'killed'), tree)
-        assert killed.run(kill_at=point) is None
+@pytest.fixture(scope='module')
+def left():
+    return Left(tree)
+
+
+def test_killed_at_every_point_each_state_ends_and_only_the_one_in_doubt_runs_again(left, tmp_path):
+    """A kill teaches nothing either: neither the state in doubt nor any other state."""
+    for point in left.points():
+        killed = left.killed_at(point, tmp_path / 'killed')
         told = killed.run()
         assert told.get('outcome') == 'succeeded', (point, told)
         begun, ended = killed.diary.count('begins'), killed.diary.count('ends')
@@ -28,6 +34,7 @@ def test_killed_at_every_point_each_state_ends_and_only_the_one_in_doubt_runs_ag
         assert [name for name in told['done'] if name not in ('LEFT', 'M1', 'M2')] == [
             name for name in ALL if name not in ('LEFT', 'M1', 'M2')
         ], point
+        assert told['rates'] == left.told['rates'], point
 
 
 def test_killed_again_and_again_it_comes_to_its_end(tmp_path):
@@ -43,20 +50,19 @@ def test_killed_again_and_again_it_comes_to_its_end(tmp_path):
     assert set(ALL) == set(killed.diary.count('ends'))
 
 
-def test_killed_while_it_resumes_it_still_stands_where_it_stood(tmp_path):
+def test_killed_while_it_resumes_it_still_stands_where_it_stood(left, tmp_path):
     """A second kill comes before anything has been done: no state runs again that had ended."""
-    for point in range(10, points_of(tmp_path, tree), 14):
-        for second in (1, 3, 4, 6):
-            killed = KilledMachine(make(tmp_path / 'killed'), tree)
-            killed.run(kill_at=point)
-            first = killed.diary.count('begins')
-            killed.run(kill_at=second)
+    seconds = (1, 3, 4, 6)
+    for point in left.points(10, 14):
+        twice = Left(tree, begins=left.folder(point), points=seconds)
+        for second in seconds:
+            killed = twice.killed_at(second, tmp_path / 'killed')
             told = killed.run()
             assert told.get('outcome') == 'succeeded', (point, second, told)
             begun = killed.diary.count('begins')
             again = {name for name in begun if begun[name] > 1}
             assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, second, again)
-            assert len(told['done']) >= len(ALL) - 2, (point, second, first)
+            assert len(told['done']) >= len(ALL) - 2, (point, second)
 
 
 @pytest.mark.parametrize('point, is_stored', [(10, False), (11, True)])
@@ -118,15 +124,6 @@ def test_equal_values_of_two_keys_do_not_become_one_object(tmp_path):
     seen = read_tree(StoreFile(killed.store, read_only=True), 1, CODECS)
     assert seen.container('TOP').keys['done'][:2] == ['C', 'ADDS']
     assert seen.container('TOP').keys['other'] == ['C']
-
-
-def test_rates_of_a_resumed_trial_are_those_of_one_that_was_not_killed(tmp_path):
-    """A kill teaches nothing: neither the state in doubt nor any other state."""
-    whole = KilledMachine(make(tmp_path / 'whole'), tree).run()
-    for point in (5, 12, 23, 31, 44, 57, 80):
-        killed = KilledMachine(make(tmp_path / 'killed'), tree)
-        assert killed.run(kill_at=point) is None
-        assert killed.run()['rates'] == whole['rates'], point
 
 
 def test_no_number_of_an_event_is_used_twice(tmp_path):
@@ -200,13 +197,13 @@ def test_a_state_that_is_not_there_is_named(tmp_path):
     assert killed.run()['outcome'] == 'succeeded'
 
 
-def test_the_log_says_in_which_state_it_goes_on(tmp_path):
-    for build, name, goes_on in (
-        (flat, 'B', ['B']),
-        (tree, 'Y', ['XY', 'Y']),
-        (tree, 'I1', ['PLAIN']),
+def test_the_log_says_in_which_state_it_goes_on(left, tmp_path):
+    for machine, name, goes_on in (
+        (Left(flat), 'B', ['B']),
+        (left, 'Y', ['XY', 'Y']),
+        (left, 'I1', ['PLAIN']),
     ):
-        killed = killed_in(make(tmp_path / 'killed'), build, name)
+        killed = machine.killed_at(machine.first_in(name), tmp_path / 'killed')
         log = killed.run()['log']
         assert any(
             re.match('TOP: trial .* goes on; its program was stopped [0-9]+ s ago', text)
@@ -219,16 +216,6 @@ def test_the_log_says_in_which_state_it_goes_on(tmp_path):
         begins = [text for text in log if 'starting in initial state' in text]
         if not os.environ.get('SMACH_UPSTREAM'):  # its engine says so before it can be put right
             assert not [text for text in begins if "'A'" in text or "'X'" in text], name
-
-
-def killed_in(folder, build, name):
-    """Return a machine that was killed as a state began for the first time."""
-    for point in range(4, 100):
-        killed = KilledMachine(make(folder), build)
-        killed.run(kill_at=point)
-        if killed.diary.count('begins')[name]:
-            return killed
-    raise AssertionError(name + ' never ran')
 
 
 def test_a_changed_script_is_not_guessed_about(tmp_path):

@@ -1,8 +1,9 @@
 """A resumed machine that is held before it goes on, and sent elsewhere by an operator."""
 
 from held_machines import Held
-from killed_machines import Diary, KilledMachine, Noted, Points, in_a_process
-from killed_trees import ENDS, make
+from killed_machines import Diary, Noted, Points, in_a_process
+from killed_trees import ENDS
+from left_stores import Left
 
 import smach
 from smach_oracle.oracle.records.events import EventKind
@@ -78,10 +79,8 @@ def sent_to_the_first(killed, build):
 
 
 def check_begins_anew(tmp_path, build):
-    killed, point = KilledMachine(make(tmp_path / 'killed'), first_and_all(build)), 1
-    while killed.diary.count('begins')['I1'] < 1:  # the second of three is under way then
-        killed, point = KilledMachine(make(tmp_path / 'killed'), first_and_all(build)), point + 1
-        killed.run(kill_at=point)
+    left = Left(first_and_all(build))
+    killed = left.killed_at(left.first_in('I1'), tmp_path / 'killed')  # the second of three
     assert killed.diary.count('ends')['I0'] == 1
     told = sent_to_the_first(killed, build)
     assert (told['outcome'], told['failures']) == ('succeeded', [])

@@ -4,7 +4,8 @@ import json
 
 import pytest
 from killed_machines import KilledMachine, Noted
-from killed_trees import ENDS, flat, make, points_of, tree
+from killed_trees import ENDS, flat, make, tree
+from left_stores import Left
 
 import smach
 from smach_oracle.oracle import Expert
@@ -46,26 +47,28 @@ def failing_tree(diary, points):
     return machine
 
 
-@pytest.mark.parametrize('on_resume', ['ask', 'recover'])
-@pytest.mark.parametrize(
-    'build, settings',
-    [
+@pytest.fixture(
+    scope='module',
+    params=[
         (tree, {}),
         (failing_tree, {'max_recoveries': 0}),
         (tree, {'on_retry': 'never'}),
         (failing_tree, {'on_retry': 'confirm'}),
     ],
 )
+def left(request, tmp_path_factory):
+    build, settings = request.param
+    return Left(build, expert=ByHand(tmp_path_factory.mktemp('left') / 'asked'), **settings)
+
+
+@pytest.mark.parametrize('on_resume', ['ask', 'recover'])
 def test_killed_anywhere_what_is_superseded_ends_the_trial_well_and_does_not_run_again(
-    tmp_path, build, settings, on_resume
+    tmp_path, left, on_resume
 ):
-    for point in range(3, points_of(tmp_path, tree), 4):
-        killed = KilledMachine(make(tmp_path / 'killed'), build, on_resume=on_resume, **settings)
-        if killed.run(kill_at=point, expert=ByHand(tmp_path / 'before')) is not None:
-            break
-        (tmp_path / 'killed' / 'diary').touch()
+    for point in range(3, 80, 4):  # the shortest one ends at 80
+        killed = left.killed_at(point, tmp_path / 'killed')
         begun, path = killed.diary.count('begins'), tmp_path / 'killed' / 'asked'
-        told = killed.run(expert=ByHand(path))
+        told = killed.run(expert=ByHand(path), on_resume=on_resume)
         assert told.get('outcome') == 'succeeded', (point, told)
         first = asked(path)[:1]
         label = first[0].rpartition('/')[2] if first else ''
@@ -79,12 +82,8 @@ def rates(told):
 
 def test_a_failure_of_before_stays_in_the_rate_of_the_state_in_doubt(tmp_path):
     """B fails once, is tried again, and is in doubt then."""
-    killed = KilledMachine(tmp_path, flat, on_resume='ask')
-    point = 0
-    while killed.diary.count('begins')['B'] < 2:
-        make(tmp_path)
-        point += 1
-        assert killed.run(kill_at=point) is None
+    left = Left(flat, on_resume='ask')
+    killed = left.killed_at(left.first_in('B', times=2), tmp_path / 'killed')
     told = killed.run(expert=ByHand(tmp_path / 'asked'))
     assert (told['outcome'], asked(tmp_path / 'asked')) == ('succeeded', ['TOP/B'])
     assert rates(told)['B'] == [0, 1]
@@ -121,17 +120,11 @@ def test_a_state_that_had_not_begun_is_not_done_by_the_oracle_once_a_person_has_
                 )
         return machine
 
+    left = Left(pouring, on_resume='ask', prior=0.5, states={'POUR': {'on_retry': 'confirm'}})
     point, path = 0, tmp_path / 'killed' / 'asked'
     while not asked(path) or asked(path)[0] != 'TOP/POUR':
-        killed = KilledMachine(
-            make(tmp_path / 'killed'),
-            pouring,
-            on_resume='ask',
-            prior=0.5,
-            states={'POUR': {'on_retry': 'confirm'}},
-        )
         point += 1
-        killed.run(kill_at=point)
+        killed = left.killed_at(point, tmp_path / 'killed')
         if not killed.diary.count('begins')['POUR']:
             killed.run(expert=ByHand(path))
     # CARRY is tried again by itself, but LOOK, from which the way leads to POUR, is not

@@ -8,7 +8,8 @@ import signal
 
 import pytest
 from killed_machines import KilledMachine, Noted, around
-from killed_trees import ALL, ENDS, flat, make, points_of, tree
+from killed_trees import ALL, ENDS, flat, make, tree
+from left_stores import Left
 from waiting import wait_for
 
 import smach
@@ -78,17 +79,19 @@ def oracle_state(*arguments):
     return out.getvalue()
 
 
-def points_in(tmp_path):
-    """Some at which the machine has not ended, from the start of the trial on."""
-    some = set(range(FIRST_STATE, points_of(tmp_path, tree), 5))
-    return sorted(some | BEFORE_THE_FIRST | ALL_HAD_ENDED)
+@pytest.fixture(scope='module')
+def left():
+    return Left(tree, on_resume='ask')
 
 
-def test_killed_anywhere_the_trial_is_kept_until_somebody_decides(tmp_path):
-    for point in points_in(tmp_path):
-        killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
-        assert killed.run(kill_at=point) is None
-        (tmp_path / 'killed' / 'diary').touch()
+def some_points(left):
+    """From the start of the trial on."""
+    return sorted({*left.points(FIRST_STATE, 5)} | BEFORE_THE_FIRST | ALL_HAD_ENDED)
+
+
+def test_killed_anywhere_the_trial_is_kept_until_somebody_decides(left, tmp_path):
+    for point in some_points(left):
+        killed = left.killed_at(point, tmp_path / 'killed')
         begun = killed.diary.count('begins')
         for _ in range(2):
             told = killed.run()
@@ -104,12 +107,10 @@ def test_killed_anywhere_the_trial_is_kept_until_somebody_decides(tmp_path):
         assert len(again) <= 1 or again <= {'LEFT', 'M1', 'M2'}, (point, again)
 
 
-def test_killed_anywhere_nothing_moves_before_the_answer(tmp_path):
+def test_killed_anywhere_nothing_moves_before_the_answer(left, tmp_path):
     asked = tmp_path / 'asked'
-    for point in points_in(tmp_path):
-        killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
-        killed.run(kill_at=point)
-        (tmp_path / 'killed' / 'diary').touch()
+    for point in some_points(left):
+        killed = left.killed_at(point, tmp_path / 'killed')
         begun, moved = killed.diary.count('begins'), tmp_path / 'moved'
 
         def give(question, number, killed=killed, begun=begun, moved=moved):
@@ -280,9 +281,9 @@ def test_a_failure_of_a_concurrence_whose_branches_had_ended_is_asked_about(tmp_
         return around('BOTH', inner, ENDS)
 
     asked, tried = tmp_path / 'asked', 0
-    for point in range(5, points_of(tmp_path, both)):
-        killed = KilledMachine(make(tmp_path / 'killed'), both, on_resume='ask')
-        killed.run(kill_at=point)
+    left = Left(both, on_resume='ask')
+    for point in left.points(5):
+        killed = left.killed_at(point, tmp_path / 'killed')
         begun = killed.diary.count('begins')
         trial, moment = last_moment(killed)
         if sum(killed.diary.count('ends').values()) != 2 or moment.kind != 'TRANSITION':

@@ -6,6 +6,7 @@ import sqlite3
 import pytest
 from killed_machines import KilledMachine, Noted
 from killed_trees import make
+from left_stores import Left
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -48,13 +49,13 @@ def killed_at(folder, point, **settings):
 
 @pytest.mark.parametrize('userdata', ['keep', 'restore'])
 def test_no_way_is_gone_twice_wherever_it_is_killed(tmp_path, userdata):
-    whole, told = killed_at(tmp_path / 'whole', 0, userdata=userdata)
+    """A crash loses the result of the way under way alone."""
+    left = Left(fetch, policy='escalating', userdata=userdata)
+    told, usual = left.told, {'HOME': 2, 'LOOK': 3, 'PICK': 5}
     assert told['outcome'] == 'succeeded'
-    usual = whole.diary.count('begins')
-    assert usual == {'HOME': 2, 'LOOK': 3, 'PICK': 5}
-    for point in range(1 + (userdata == 'keep'), told['points'], 2):
-        killed, nothing = killed_at(tmp_path / 'killed', point, userdata=userdata)
-        assert nothing is None
+    assert left.killed_at(told['points'], tmp_path / 'killed').diary.count('begins') == usual
+    for point in left.points(1 + (userdata == 'keep'), 2):
+        killed = left.killed_at(point, tmp_path / 'killed')
         rest = killed.run()
         assert rest.get('outcome') == 'succeeded', (point, rest)
         begun = killed.diary.count('begins')
@@ -63,6 +64,9 @@ def test_no_way_is_gone_twice_wherever_it_is_killed(tmp_path, userdata):
         assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)
         if userdata == 'restore':  # what was in doubt has not come to its end
             assert rest['done'] == told['done'], point
+        found = rest['ways']['PICK']
+        # the state in doubt is entered again, and may succeed earlier than it would have
+        assert 2 <= len(found) <= 4 and all(not helped for _, helped in found[:-1]), (point, found)
 
 
 def facts(store, name):
@@ -84,14 +88,6 @@ def test_the_results_are_stored_where_there_is_one_more_and_not_at_each_visit(tm
     assert [each['ways_total'] for each in stored] == [1, 2, 3, 4]
     assert all('ways' not in text for _, text in facts(killed.store, 'state:PICK'))
     assert not facts(killed.store, 'ways:LOOK')
-
-
-def test_a_crash_loses_the_result_of_the_way_under_way_alone(tmp_path):
-    for point in range(1, killed_at(tmp_path / 'whole', 0)[1]['points'], 3):
-        killed, _ = killed_at(tmp_path / 'killed', point)
-        found = killed.run()['ways']['PICK']
-        # the state in doubt is entered again, and may succeed earlier than it would have
-        assert 2 <= len(found) <= 4 and all(not helped for _, helped in found[:-1]), (point, found)
 
 
 def as_before(store):
