@@ -102,6 +102,10 @@ def test_preconditions_beside_the_settings_are_a_mapping():
         as_settings(None, ['LOOK'])
     with pytest.raises(SettingsError, match='preconditions: .*a mapping of state labels to lists'):
         as_settings(Settings(), 'LOOK')
+    with pytest.raises(
+        SettingsError, match='preconditions: 1 is not allowed.*names that are strings'
+    ):
+        as_settings(None, {1: ['A']})
 
 
 @pytest.mark.parametrize(

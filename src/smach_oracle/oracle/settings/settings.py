@@ -449,5 +449,8 @@ def as_settings(settings: SettingsLike, preconditions: PreconditionLists) -> Set
     if not isinstance(preconditions, Mapping):
         raise SettingsError('preconditions', preconditions, 'a mapping of state labels to lists')
     return found.with_states(
-        {label: {'preconditions': given} for label, given in preconditions.items()}
+        {
+            label: {'preconditions': given}
+            for label, given in values.mapping('preconditions', preconditions).items()
+        }
     )
