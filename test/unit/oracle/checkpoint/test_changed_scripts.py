@@ -4,14 +4,16 @@ import contextlib
 import functools
 import io
 import json
+import os
 import re
+import signal
 
 import pytest
 from killed_machines import KilledMachine, Noted
 from left_stores import Left
 
 import smach
-from smach_oracle.oracle import Expert
+from smach_oracle.oracle import Answer, AnswerKind, Expert
 from smach_oracle.oracle.checkpoint.stored_marks import _joined
 from smach_oracle.oracle.records.visits import VisitMark
 from smach_oracle.store.state_command import main
@@ -72,20 +74,21 @@ BEFORE = task()
 RENAMED = task(A='START', KITCHEN='GALLEY', LOOK='SEE', LEFT='PORT', LAST='END', Z='Y')
 
 
-def flat_before(diary, points):
+def flat_before(diary, points, failures=0):
     machine = smach.StateMachine(OUTCOMES)
     machine.userdata.done = []
     with machine:
         for label, follows in (('A', 'B'), ('B', 'C'), ('C', 'D'), ('D', 'succeeded')):
-            machine.add(label, Noted(label, diary, points), {'succeeded': follows})
+            noted = Noted(label, diary, points, failures=failures if label == 'B' else 0)
+            machine.add(label, noted, {'succeeded': follows})
     return machine
 
 
-def nested_after(diary, points):
+def nested_after(diary, points, failures=0):
     """B and C stand in a machine of their own."""
     inner = smach.StateMachine(OUTCOMES, ['done'], ['done'])
     with inner:
-        inner.add('B', Noted('B', diary, points), {'succeeded': 'C'})
+        inner.add('B', Noted('B', diary, points, failures=failures), {'succeeded': 'C'})
         inner.add('C', Noted('C', diary, points), ENDS)
     machine = smach.StateMachine(OUTCOMES)
     machine.userdata.done = []
@@ -153,6 +156,35 @@ def test_what_has_moved_into_another_container_goes_on_there(folder):
 def test_what_has_moved_out_of_a_container_goes_on_there(folder):
     names = {'IN': 'B', 'IN/B': 'B', 'IN/C': 'C'}
     assert list(told_at_each_point(folder, nested_after, flat_before, names))
+
+
+class _Noting(Expert):
+    """Notes the id of each question in a file, and kills the program or sends it on."""
+
+    def __init__(self, path, dies):
+        self._path, self._dies = path, dies
+
+    def ask(self, question, cancelled, progress):
+        with open(self._path, 'a') as file:
+            file.write('{} {}\n'.format(question.question_id, question.failed_state))
+        if self._dies:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return Answer(AnswerKind.GOTO, state=question.failed_state)
+
+
+def test_the_question_about_a_moved_state_is_open_again(folder):
+    before, after = both_scripts(
+        folder,
+        functools.partial(flat_before, failures=1),
+        functools.partial(nested_after, failures=1),
+        resume_map={'B': 'IN/B', 'C': 'IN/C'},
+    )
+    asked = str(folder / 'asked')
+    assert before.run(expert=_Noting(asked, True), max_recoveries=0) is None
+    assert after.run(expert=_Noting(asked, False), max_recoveries=0)['outcome'] == 'succeeded'
+    with open(asked) as file:
+        first, again, *_ = file.read().splitlines()
+    assert first.endswith(' B') and again == first
 
 
 def test_a_moved_state_in_doubt_is_not_repeated_where_it_must_not_be(folder):
