@@ -25,6 +25,8 @@ from .stored_tree import StoredTree
 
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
+# not SUPERSEDE: what it counts belongs to the move that follows. Stored without that, it would be
+# counted again by the next program, which asks again
 _COMMITTED = {
     EventKind.TRIAL_START,
     EventKind.RESUMED,
@@ -36,7 +38,6 @@ _COMMITTED = {
     EventKind.QUERY_EXPIRED,
     EventKind.QUERY_CANCELLED,
     EventKind.JUMP,
-    EventKind.SUPERSEDE,
     EventKind.GIVE_UP,
     EventKind.HOLD_START,
     EventKind.SENT,

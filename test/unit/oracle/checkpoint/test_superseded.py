@@ -65,7 +65,7 @@ def left(request, tmp_path_factory):
 def test_killed_anywhere_what_is_superseded_ends_the_trial_well_and_does_not_run_again(
     tmp_path, left, on_resume
 ):
-    for point in range(3, 80, 4):  # the shortest one ends at 80
+    for point in left.points(3, 4):
         killed = left.killed_at(point, tmp_path / 'killed')
         begun, path = killed.diary.count('begins'), tmp_path / 'killed' / 'asked'
         told = killed.run(expert=ByHand(path), on_resume=on_resume)
@@ -87,6 +87,26 @@ def test_a_failure_of_before_stays_in_the_rate_of_the_state_in_doubt(tmp_path):
     told = killed.run(expert=ByHand(tmp_path / 'asked'))
     assert (told['outcome'], asked(tmp_path / 'asked')) == ('succeeded', ['TOP/B'])
     assert rates(told)['B'] == [0, 1]
+
+
+def failing_twice(diary, points):
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        for label, following in (('A', 'B'), ('B', 'succeeded')):
+            noted = Noted(label, diary, points, failures=1)
+            smach.StateMachine.add(label, noted, dict(ENDS, succeeded=following))
+    return machine
+
+
+def test_wherever_it_is_killed_a_failure_is_taken_back_once(tmp_path):
+    """Also between the answer and the move to the next state, or to the end."""
+    left = Left(failing_twice, expert=ByHand(tmp_path / 'asked'), max_recoveries=0)
+    for point in left.points():
+        killed = left.killed_at(point, tmp_path / 'killed')
+        told = killed.run(expert=ByHand(tmp_path / 'killed' / 'asked'))
+        assert told.get('outcome') == 'succeeded', (point, told)
+        assert rates(told) == {'A': [0, 0], 'B': [0, 0]}, point
 
 
 def test_a_failure_that_was_asked_about_is_taken_back_once(tmp_path):
