@@ -6,7 +6,6 @@ from kitchen_trial import in_kitchen
 
 from smach_oracle.msg import PickGoal
 from smach_oracle.pr2.nodes.kitchen_skills import FRIDGE
-from smach_oracle.pr2.planning.arm import TILT, Arm
 from smach_oracle.pr2.skills.fridge_pick import CARRIED, beside
 from smach_oracle.simulation.physics.world import World
 from smach_oracle.simulation.rehearsal.direct_robot import no_report
@@ -76,26 +75,6 @@ def test_a_drink_that_was_grasped_with_an_inclined_hand_is_carried_upright():
         assert world.holding('drink_0') and tilt(world, 'drink_0') < 12.0
 
     in_kitchen(1, 5, upright)
-
-
-def steepest(limb, way):
-    """How far the hand tilts on a path, at most, rad."""
-    upright = limb.pose()[2, :3]
-    points = np.vstack([np.linspace(*ends, 20) for ends in zip(way[:-1], way[1:])])
-    return max(np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in points)
-
-
-def test_on_a_level_way_the_hand_hardly_tilts():
-    def level(world, trial):
-        pick(trial, attempt=0)
-        with Arm(trial.skills.context, 'right', {}, 1) as limb:
-            there = limb.pose()
-            there[:3, 3] += (0.10, 0.30, -0.20)
-            goal = limb.reach(there, near=limb.now())[-1]
-            assert steepest(limb, limb.level_path(goal)) <= TILT
-            assert steepest(limb, limb.path(goal)) > 2 * TILT, 'there is another way'
-
-    in_kitchen(1, 5, level)
 
 
 def test_a_drink_is_reached_by_pushing_its_neighbour_once_no_other_grasp_is_left():

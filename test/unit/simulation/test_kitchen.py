@@ -8,9 +8,8 @@ import itertools
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
-from kitchen_trial import in_kitchen
+from kitchen_trial import ENDED, in_kitchen, stopped_in_kitchen
 from std_msgs.msg import Header
-from support.stopped_robot import stopped_after
 
 from smach_oracle.geometry.transforms import apply, from_rpy
 from smach_oracle.msg import (
@@ -30,10 +29,9 @@ from smach_oracle.pr2.kitchen import (
 from smach_oracle.pr2.nodes import kitchen_skills
 from smach_oracle.pr2.nodes.kitchen_skills import KitchenSkills
 from smach_oracle.pr2.perception.door_view import DoorNotSeen, find_door
-from smach_oracle.pr2.planning.arm import Arm, SkillContext, SkillError
+from smach_oracle.pr2.planning.arm import TILT, Arm, SkillContext, SkillError
 from smach_oracle.pr2.planning.collision import installed_model
 from smach_oracle.pr2.planning.travel import carry, stow
-from smach_oracle.pr2.robot import RobotError
 from smach_oracle.pr2.skills import door
 from smach_oracle.pr2.skills.pick import ObjectSlipped
 from smach_oracle.simulation.physics.judge import judge
@@ -214,27 +212,42 @@ def next_of(machine, label):
     )
 
 
-@pytest.mark.parametrize('motions', [3, 5, 7, 99])
-def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(motions):
-    """99: it had ended, and nobody was told."""
-
-    def stopped_and_ended(world, trial):
-        pick, do = trial.states[5][1], trial.robot._do
-        stopped_after(trial.robot, motions, for_good=True)
-        if motions < 99:
-            with pytest.raises((RobotError, SkillError), match='told to stop'):
-                pick()
-        else:
-            pick()
-        trial.robot._do = do
-        assert bool(world.holding('drink_0')) == (motions > 3)
-        pick()
-        for _, work in trial.states[6:]:
+@pytest.fixture(name='stopped_picks', scope='module')
+def _stopped_picks():
+    def ended(world, trial):
+        held = world.holding('drink_0')
+        for _, work in trial.states[5:]:
             work()
         world.step(60)
-        assert judge(world, world.scene.goal).success
+        return bool(held), judge(world, world.scene.goal).success
 
-    in_kitchen(1, 5, stopped_and_ended)
+    return stopped_in_kitchen(1, 5, (3, 5, 7, ENDED), ended)
+
+
+@pytest.mark.parametrize('motions', [3, 5, 7, ENDED])
+def test_a_pick_that_was_stopped_in_the_fridge_or_before_it_is_ended(stopped_picks, motions):
+    held, success = stopped_picks[motions].answer()
+    assert held == (motions > 3)
+    assert success
+
+
+def steepest(limb, way):
+    """How far the hand tilts on a path, at most, rad."""
+    upright = limb.pose()[2, :3]
+    points = np.vstack([np.linspace(*ends, 20) for ends in zip(way[:-1], way[1:])])
+    return max(np.arccos(min(1.0, limb.chain.forward(q)[2, :3] @ upright)) for q in points)
+
+
+def test_on_a_level_way_the_hand_hardly_tilts():
+    def level(world, trial):
+        with Arm(trial.skills.context, 'right', {}, 1) as limb:
+            there = limb.pose()
+            there[:3, 3] += (0.10, 0.30, -0.20)
+            goal = limb.reach(there, near=limb.now())[-1]
+            assert steepest(limb, limb.level_path(goal)) <= TILT
+            assert steepest(limb, limb.path(goal)) > 2 * TILT, 'there is another way'
+
+    in_kitchen(1, 6, level)
 
 
 def test_a_robot_that_held_something_when_its_last_trial_ended_does_the_next_one_as_ever():
@@ -256,27 +269,37 @@ def test_a_robot_that_held_something_when_its_last_trial_ended_does_the_next_one
     in_kitchen(1, 6, done_again)
 
 
-@pytest.mark.parametrize('motions', [4, 11, 99])
-def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(motions):
-    """99: it had ended, and nobody was told."""
-
-    def stopped_and_ended(world, trial):
+@pytest.fixture(name='stopped_hand_overs', scope='module')
+def _stopped_hand_overs():
+    def ended(world, trial):
         hand_over = trial.states[-1][1]
-        stopped_after(trial.robot, motions)
-        if motions < 99:
-            with pytest.raises(SkillError, match='told to stop'):
-                hand_over()
-        else:
-            hand_over()
         hand_over()
         world.step(60)
-        assert judge(world, world.scene.goal).success
-        if motions == 99:  # it has been taken from the palm
-            world.reset(world.scene)
-            with pytest.raises(SkillError):
-                hand_over()
+        success = judge(world, world.scene.goal).success
+        world.reset(world.scene)  # as where it has been taken from the palm
+        with pytest.raises(SkillError):
+            hand_over()
+        return success
 
-    in_kitchen(1, 9, stopped_and_ended)
+    return stopped_in_kitchen(1, 9, (4, 11, ENDED), ended, for_good=False, failure=SkillError)
+
+
+@pytest.mark.parametrize('motions', [4, 11, ENDED])
+def test_a_hand_over_that_was_stopped_above_the_palm_or_after_it_let_go_is_ended(
+    stopped_hand_overs, motions
+):
+    assert stopped_hand_overs[motions].answer()
+
+
+def test_the_robot_touches_the_fridge_and_the_drink_and_nothing_else():
+    """In the whole task, which succeeds."""
+
+    def touched(world, trial):
+        world.step(60)
+        assert judge(world, world.scene.goal).success
+        assert len(world.movable()) > 1 and world.touched == {'fridge', 'drink_0'}
+
+    in_kitchen(1, 10, touched)
 
 
 def off_after_a_look(degrees, wrong):
