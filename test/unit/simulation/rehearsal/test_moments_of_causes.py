@@ -4,6 +4,8 @@ The script's states run in the world, with the code behind the real robot's acti
 came is read from the world's own log.
 """
 
+from typing import Dict, List, NamedTuple
+
 import numpy as np
 import pytest
 
@@ -18,30 +20,46 @@ FALLEN = 1.0  # rad. A door that swings back is open by less
 SEEDS = (3, 11)
 
 
-@pytest.fixture(scope='module')
-def world():
+@pytest.fixture(name='world', scope='module')
+def _world():
     one = World(binning=2)
     yield one
     one.close()
 
 
-def scene_with(monkeypatch, seed, *kinds):
+def scene_with(seed, *kinds):
     """The scene of a seed with these causes, and no other."""
-    monkeypatch.setattr(
-        kitchen_causes,
-        'drawn_kinds',
-        lambda *_: iter([(kind, np.random.default_rng([seed, *kind.encode()])) for kind in kinds]),
-    )
-    return kitchen_scene.draw(seed)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            kitchen_causes,
+            'drawn_kinds',
+            lambda *_: iter(
+                [(kind, np.random.default_rng([seed, *kind.encode()])) for kind in kinds]
+            ),
+        )
+        return kitchen_scene.draw(seed)
 
 
-def tried(world, scene, last):
-    """Run the script to a state, or until one fails.
+class _Course(NamedTuple):
+    """What a trial has shown."""
 
-    :returns: when each state began, s since the trial did, and all images so far by their time.
-    """
+    begins: Dict[str, float]  # when each state began, s since the trial did
+    images: List[float]  # when each was taken
+    causes: Dict[str, float]  # when each began
+    door: float  # rad that it stood open when the robot had driven in
+
+
+@pytest.fixture(
+    name='course',
+    scope='module',
+    params=[(seed, more) for seed in SEEDS for more in ((), ('base_misplaced',))],
+)
+def _course(request, world):
+    """The script, run until the drink is looked for or a state fails, with all causes."""
+    seed, more = request.param
+    scene = scene_with(seed, 'door_swings_back', 'drink_moved', *LIGHTS, *more)
     world.reset(scene)
-    since, begins, images = world.time, {}, []
+    since, begins, images, door = world.time, {}, [], None
     trial = DrinkRetrievalRehearsal(world)
     see = trial.robot.see
 
@@ -51,41 +69,28 @@ def tried(world, scene, last):
         return image
 
     trial.robot.see = told
-    for name, work in trial.states:
+    for name, work in trial.states[:5]:
         begins[name] = world.time - since
         try:
             work()
         except FAILURES:
             break
-        if name == last:
-            break
-    return begins, images
+        finally:
+            if name == 'MOVE_IN':
+                door = world.body_joint('fridge', DOOR_JOINT)
+    causes = {span.kind: span.began_s for span in world.cause_spans()}
+    return _Course(begins, images, causes, door)
 
 
-def began(world, kind):
-    """When a cause began, s since the trial did."""
-    return next(span.began_s for span in world.cause_spans() if span.kind == kind)
+def test_the_door_swings_back_when_the_robot_is_about_to_drive_in(course):
+    began = course.causes['door_swings_back']
+    assert began == pytest.approx(course.begins['MOVE_IN'], abs=0.1)
+    assert course.door < FALLEN
 
 
-@pytest.mark.parametrize('misplaced', [(), ('base_misplaced',)])
-@pytest.mark.parametrize('seed', SEEDS)
-def test_the_door_swings_back_when_the_robot_is_about_to_drive_in(
-    monkeypatch, world, seed, misplaced
-):
-    scene = scene_with(monkeypatch, seed, 'door_swings_back', *misplaced)
-    begins, _ = tried(world, scene, 'MOVE_IN')
-    assert began(world, 'door_swings_back') == pytest.approx(begins['MOVE_IN'], abs=0.1)
-    assert world.body_joint('fridge', DOOR_JOINT) < FALLEN
-
-
-@pytest.mark.parametrize('misplaced', [(), ('base_misplaced',)])
-@pytest.mark.parametrize('seed', SEEDS)
-def test_light_changes_once_the_camera_has_turned_and_a_drink_moves_once_it_was_seen(
-    monkeypatch, world, seed, misplaced
-):
-    scene = scene_with(monkeypatch, seed, 'drink_moved', *LIGHTS, *misplaced)
-    begins, images = tried(world, scene, 'DETECT_DRINK')
-    looked = min(moment for moment in images if moment > begins['DETECT_DRINK'])
+def test_light_changes_once_the_camera_has_turned_and_a_drink_moves_once_it_was_seen(course):
+    begun = course.begins['DETECT_DRINK']
+    looked = min(moment for moment in course.images if moment > begun)
     for kind in LIGHTS:
-        assert begins['DETECT_DRINK'] < began(world, kind) < looked, kind
-    assert began(world, 'drink_moved') == pytest.approx(looked, abs=0.1)
+        assert begun < course.causes[kind] < looked, kind
+    assert course.causes['drink_moved'] == pytest.approx(looked, abs=0.1)
