@@ -7,6 +7,7 @@ import itertools
 
 import numpy as np
 import pytest
+from drawn_scenes import drawn
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from kitchen_trial import ENDED, in_kitchen, stopped_in_kitchen
 from std_msgs.msg import Header
@@ -40,7 +41,7 @@ from smach_oracle.simulation.rehearsal import drink_retrieval as drink_rehearsal
 from smach_oracle.simulation.rehearsal.direct_robot import DirectRobot
 from smach_oracle.simulation.scenes.fridge import DOOR_JOINT, fridge_urdf
 from smach_oracle.simulation.scenes.kitchen_causes import KINDS
-from smach_oracle.simulation.scenes.kitchen_scene import draw
+from smach_oracle.simulation.scenes.kitchen_scene import TASK, draw
 from smach_oracle.simulation.scenes.person import PALM
 from smach_oracle.simulation.scenes.unlike_the_map import true_kitchen
 from smach_oracle.tasks import drink_retrieval
@@ -107,7 +108,7 @@ def test_the_same_seed_gives_the_same_kitchen_and_a_benign_one_has_no_cause():
 
 
 def test_all_causes_come_up_and_each_kitchen_can_be_built():
-    scenes = [draw(seed) for seed in range(300)]
+    scenes = [drawn(TASK, seed) for seed in range(300)]
     counts = collections.Counter(cause.kind for scene in scenes for cause in scene.causes)
     assert set(counts) == set(KINDS)
     assert all(cause.text for scene in scenes for cause in scene.causes)
@@ -416,7 +417,7 @@ def test_what_slipped_is_gripped_firmer_until_the_fridge_is_opened_again(monkeyp
 def test_a_moved_drink_is_moved_to_where_there_is_room():
     scenes = [
         scene
-        for scene in map(draw, range(300))
+        for scene in (drawn(TASK, seed) for seed in range(300))
         if 'drink_moved' in [cause.kind for cause in scene.causes]
     ]
     assert len(scenes) > 10

@@ -2,6 +2,8 @@
 answer.
 """
 
+import functools
+
 import pytest
 from roslaunch.config import load_config_default
 from roslaunch.substitution_args import resolve_args
@@ -18,8 +20,9 @@ PIECES = {
 }
 
 
+@functools.lru_cache(maxsize=None)
 def launched(name, *arguments):
-    """What roslaunch would start."""
+    """What roslaunch would start. Tests read it only."""
     return load_config_default(
         [(resolve_args('$(find smach_oracle)/launch/{}.launch'.format(name)), list(arguments))],
         11311,

@@ -4,6 +4,7 @@ import collections
 
 import numpy as np
 import pytest
+from drawn_scenes import drawn
 
 from smach_oracle.simulation.scenes import kitchen_causes, tabletop_causes
 from smach_oracle.simulation.scenes.cause_draws import (
@@ -13,18 +14,14 @@ from smach_oracle.simulation.scenes.cause_draws import (
     drawn_kinds,
 )
 from smach_oracle.simulation.scenes.light_causes import cloud_minutes, passing_seconds
-from smach_oracle.simulation.scenes.tasks import TASKS, draw
+from smach_oracle.simulation.scenes.tasks import TASKS
 
 CAUSES = dict(zip(TASKS, (tabletop_causes, kitchen_causes)))
 
 
-def drawn(task, lasting):
-    return [draw(task, seed, False, lasting) for seed in range(300)]
-
-
 @pytest.mark.parametrize('task', TASKS)
 def test_at_least_half_of_the_trials_with_a_cause_have_one_that_lasts(task):
-    scenes = [draw(task, seed, False) for seed in range(900)]
+    scenes = [drawn(task, seed) for seed in range(900)]
     with_cause = [scene for scene in scenes if scene.causes]
     amount = CAUSES[task].AMOUNT
     assert len(with_cause) / 900 == pytest.approx(amount, abs=0.04)
@@ -38,8 +35,11 @@ def test_at_least_half_of_the_trials_with_a_cause_have_one_that_lasts(task):
 
 @pytest.mark.parametrize('task', TASKS)
 def test_the_share_that_lasts_changes_which_causes_there_are_but_not_where(task):
-    none, half, all_ = (drawn(task, share) for share in (0.0, 0.5, 1.0))
-    for scenes in zip(none, half, all_):
+    none, usual, all_ = (
+        [drawn(task, seed, **more) for seed in range(300)]
+        for more in ({'lasting': 0.0}, {}, {'lasting': 1.0})
+    )
+    for scenes in zip(none, usual, all_):
         if task != 'pick_and_place':  # where a few cannot be had in a scene
             assert len({bool(scene.causes) for scene in scenes}) == 1
     assert not any(each.lasting for scene in none for each in scene.causes)

@@ -5,6 +5,7 @@ import hashlib
 
 import numpy as np
 import pytest
+from drawn_scenes import drawn
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.simulation.node.settings import read_settings
@@ -15,10 +16,6 @@ from smach_oracle.simulation.scenes.tasks import TASKS, draw
 CAUSES = dict(zip(TASKS, (tabletop_causes, kitchen_causes)))
 # of the usual scenes of the seeds 0 to 149, from before there were extra kinds
 USUAL = {'pick_and_place': '527fa8e09a89418d', 'drink_retrieval': 'da7b37f34c9927cc'}
-
-
-def extra(task, seed):
-    return draw(task, seed, False, extra=True)
 
 
 def rounded(value):
@@ -48,7 +45,7 @@ def digest_of(scenes):
 
 @pytest.mark.parametrize('task', TASKS)
 def test_the_usual_scenes_are_as_they_were(task):
-    scenes = [draw(task, seed, False) for seed in range(150)]
+    scenes = [drawn(task, seed) for seed in range(150)]
     assert digest_of(scenes) == USUAL[task]
     assert all(scene.robot.drive_bias == (0.0, 0.0, 0.0) for scene in scenes)
     kinds = {cause.kind for scene in scenes for cause in scene.causes}
@@ -57,7 +54,7 @@ def test_the_usual_scenes_are_as_they_were(task):
 
 @pytest.mark.parametrize('task', TASKS)
 def test_each_trial_has_one_extra_kind_half_of_which_last(task):
-    scenes = [extra(task, seed) for seed in range(400)]
+    scenes = [drawn(task, seed, extra=True) for seed in range(400)]
     assert all(len(scene.causes) == 1 for scene in scenes)
     counts = collections.Counter(scene.causes[0].kind for scene in scenes)
     (lasts,), (passes,) = (CAUSES[task].EXTRA_KINDS_OF[each] for each in (LASTING, PASSING))
@@ -69,8 +66,8 @@ def test_each_trial_has_one_extra_kind_half_of_which_last(task):
 @pytest.mark.parametrize('task', TASKS)
 def test_all_but_the_cause_is_as_in_a_trial_without_one(task):
     for seed in range(30):
-        scene, benign = extra(task, seed), draw(task, seed, True)
-        assert scene == extra(task, seed)
+        scene, benign = drawn(task, seed, extra=True), drawn(task, seed, True)
+        assert scene == draw(task, seed, False, extra=True)
         assert (scene.bodies, scene.goal) == (benign.bodies, benign.goal)
         assert scene.robot._replace(drive_bias=(0.0, 0.0, 0.0)) == benign.robot
         assert {each.cause for each in scene.disturbances} <= {scene.causes[0].kind}
@@ -80,7 +77,7 @@ def test_the_values_lie_within_their_limits():
     found = collections.defaultdict(list)
     for task in TASKS:
         for seed in range(300):
-            scene = extra(task, seed)
+            scene = drawn(task, seed, extra=True)
             kind = scene.causes[0].kind
             values = dict(scene.disturbances[0].values) if scene.disturbances else {}
             found[kind].append((values, scene.robot.drive_bias))

@@ -1,9 +1,10 @@
 """The drink that is ordered: red, anywhere in a hand's reach, and not always the nearest."""
 
 import numpy as np
+from drawn_scenes import drawn
 
 from smach_oracle.simulation.scenes.kitchen_causes import KINDS_OF, TARGET
-from smach_oracle.simulation.scenes.kitchen_scene import COLOURS, DEPTHS, HAND, ORDERED, draw
+from smach_oracle.simulation.scenes.kitchen_scene import COLOURS, DEPTHS, HAND, ORDERED, TASK
 from smach_oracle.simulation.scenes.unlike_the_map import true_kitchen
 
 SEEDS = range(200)
@@ -23,7 +24,7 @@ def drinks_of(scene):
 def test_the_ordered_drink_is_the_red_one_and_often_not_the_nearest():
     nearest = 0
     for seed in SEEDS:
-        scene = draw(seed, benign=True)
+        scene = drawn(TASK, seed, True)
         ordered = next(body for body in scene.bodies if body.name == scene.goal.body)
         assert (ordered.name, ordered.colour) == (ORDERED, COLOURS[0])
         places = drinks_of(scene)
@@ -33,7 +34,7 @@ def test_the_ordered_drink_is_the_red_one_and_often_not_the_nearest():
 
 def test_no_other_drink_is_in_the_hands_way_to_it():
     for seed in SEEDS:
-        places = drinks_of(draw(seed, benign=True))
+        places = drinks_of(drawn(TASK, seed, True))
         there = places.pop(ORDERED)
         assert not any(x < there[0] and abs(y - there[1]) < HAND for x, y in places.values())
         assert DEPTHS[0] - 1e-9 <= there[0] <= DEPTHS[1] + 1e-9
@@ -42,7 +43,7 @@ def test_no_other_drink_is_in_the_hands_way_to_it():
 def test_causes_are_about_the_ordered_drink():
     kinds = set()
     for seed in SEEDS:
-        scene = draw(seed)
+        scene = drawn(TASK, seed)
         for each in scene.disturbances:
             assert each.kind in ('dim', 'glare', 'swing:fridge', 'nudge:' + ORDERED)
         kinds |= {cause.kind for cause in scene.causes if cause.until[:1] == (ORDERED,)}
