@@ -1,5 +1,6 @@
 """Work in a copy of this process, for tests that begin where the same long way has led."""
 
+import functools
 import os
 import pickle
 import traceback
@@ -56,3 +57,13 @@ def in_a_fork(work):
         fork.end_with(work)
     fork.wait()
     return fork.answer()
+
+
+def in_own_fork(test):
+    """A test that is done in a fork: what it changes in a world stays hidden from the others."""
+
+    @functools.wraps(test)
+    def forked(**given):
+        in_a_fork(lambda: test(**given))
+
+    return forked

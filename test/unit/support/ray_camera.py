@@ -2,6 +2,7 @@
 pixel it is.
 """
 
+import functools
 from typing import NamedTuple, Sequence
 
 import numpy as np
@@ -43,23 +44,9 @@ def see(
     depth, whose = np.full((HEIGHT, WIDTH), np.inf), np.full((HEIGHT, WIDTH), -1)
     colour = np.full((HEIGHT, WIDTH, 3), 0.75)
     for index, body in enumerate(bodies):
-        part = _part_of_image(body, camera)
-        rows, columns = (each[part] for each in np.indices((HEIGHT, WIDTH)))
-        rays = (
-            np.stack(
-                [
-                    (columns - INTRINSICS[0, 2]) / FOCAL,
-                    (rows - INTRINSICS[1, 2]) / FOCAL,
-                    np.ones(rows.shape),
-                ],
-                axis=-1,
-            )
-            @ camera[:3, :3].T
-        )
-        found, normal = _cast(body, camera[:3, 3], rays)
+        part, found, shade = _shown(body, camera.tobytes())
         nearer = found < depth[part]
         depth[part][nearer], whose[part][nearer] = found[nearer], index
-        shade = 0.55 + 0.45 * np.clip(normal @ LIGHT, 0, 1)
         colour[part][nearer] = (np.array(body.colour) * shade[..., None])[nearer]
     image = 255 * colour + generator.normal(0, colour_noise, colour.shape)
     return Seen(
@@ -72,6 +59,27 @@ def see(
         ),
         whose,
     )
+
+
+@functools.lru_cache(maxsize=32)  # floors and tables are in most images, and take longest
+def _shown(body: Body, camera: bytes):
+    """Where a body may be in the image, its distance there along each ray, and its shade."""
+    pose = np.frombuffer(camera).reshape(4, 4)
+    part = _part_of_image(body, pose)
+    rows, columns = (each[part] for each in np.indices((HEIGHT, WIDTH)))
+    rays = (
+        np.stack(
+            [
+                (columns - INTRINSICS[0, 2]) / FOCAL,
+                (rows - INTRINSICS[1, 2]) / FOCAL,
+                np.ones(rows.shape),
+            ],
+            axis=-1,
+        )
+        @ pose[:3, :3].T
+    )
+    found, normal = _cast(body, pose[:3, 3], rays)
+    return part, found, 0.55 + 0.45 * np.clip(normal @ LIGHT, 0, 1)
 
 
 def _measured(depth: np.ndarray, generator: np.random.Generator, noise: float) -> np.ndarray:

@@ -4,6 +4,7 @@ import math
 
 import pybullet
 import pytest
+from forked import in_own_fork
 from geometry_msgs.msg import Point, Pose, PoseStamped, Quaternion, Vector3
 from std_msgs.msg import Header
 from worlds import CAN, CARTON, TABLE, scene
@@ -89,17 +90,18 @@ def size_of(body):
     return Vector3(*wide)
 
 
-@pytest.fixture(name='bench_of')
-def _bench_of():
-    made = []
+@pytest.fixture(name='bench', scope='module')
+def _bench():
+    bench = Bench()
+    yield bench
+    bench.world.close()
 
-    def bench_of(*more, **can):
-        made.append(Bench(*more, **can))
-        return made[-1]
 
-    yield bench_of
-    for bench in made:
-        bench.world.close()
+@pytest.fixture(name='bench_with_post', scope='module')
+def _bench_with_post():
+    bench = Bench(POST, can=SLIM)
+    yield bench
+    bench.world.close()
 
 
 @pytest.fixture(name='after_release')
@@ -116,16 +118,17 @@ def _after_release(monkeypatch):
     return happens.append
 
 
-def test_what_stands_when_the_hand_has_let_go_is_placed(bench_of):
-    bench = bench_of()
+@in_own_fork
+def test_what_stands_when_the_hand_has_let_go_is_placed(bench):
     bench.place()
     assert bench.upright()
 
 
 @pytest.mark.parametrize('degrees', [20, 25])
-def test_what_leans_against_another_thing_is_told_to_lean(bench_of, after_release, degrees):
+@in_own_fork
+def test_what_leans_against_another_thing_is_told_to_lean(bench_with_post, after_release, degrees):
     """Judged by the angle in the world, too."""
-    bench = bench_of(POST, can=SLIM)
+    bench = bench_with_post
     lean = math.radians(degrees)
     # its upper edge touches the post, its lower edge stands on the table
     edge = POST.position[1] + POST.size[1] / 2
@@ -142,26 +145,24 @@ def test_what_leans_against_another_thing_is_told_to_lean(bench_of, after_releas
     assert not bench.upright()
 
 
-def test_what_lies_is_told_to_lie(bench_of, after_release):
-    bench = bench_of()
+@in_own_fork
+def test_what_lies_is_told_to_lie(bench, after_release):
     after_release(lambda: bench.move('can', (PLACE[0], PLACE[1], 0.752), math.pi / 2))
     with pytest.raises(SkillError, match='let go, but it lies at its place: .* 6 cm high'):
         bench.place()
     assert not bench.upright()
 
 
-def test_what_has_rolled_away_is_told_to_be_gone(bench_of, after_release):
-    bench = bench_of()
+@in_own_fork
+def test_what_has_rolled_away_is_told_to_be_gone(bench, after_release):
     after_release(lambda: bench.move('can', (PLACE[0] + 0.25, PLACE[1], 0.752), math.pi / 2))
     with pytest.raises(SkillError, match='let go, but nothing stands at its place'):
         bench.place()
 
 
-def test_another_thing_than_was_meant_is_told_by_its_colour_also_to_a_second_try(
-    bench_of, after_release
-):
+def test_another_thing_than_was_meant_is_told_by_its_colour_also_to_a_second_try(after_release):
     """The second try finds the hand empty, and the other thing in place."""
-    bench = bench_of(STAND_IN)
+    bench = Bench(STAND_IN)
 
     def swap():
         bench.move('can', (1.05, -0.55, 0.78))
@@ -173,6 +174,7 @@ def test_another_thing_than_was_meant_is_told_by_its_colour_also_to_a_second_try
         bench.place()
     with pytest.raises(ObjectLost, match='the right hand holds nothing, and ' + told):
         bench.place()
+    bench.world.close()
 
 
 @pytest.mark.parametrize(
@@ -183,11 +185,12 @@ def test_another_thing_than_was_meant_is_told_by_its_colour_also_to_a_second_try
         (1, 'while it was lowered', (1.05, -0.55, 0.78)),
     ],
 )
+@in_own_fork
 def test_a_hand_that_loses_its_object_says_so_wherever_it_falls(
-    bench_of, monkeypatch, turn, where, fallen
+    bench, monkeypatch, turn, where, fallen
 ):
     """Also to a second try, and where the object fell upside down upon its place."""
-    bench, follow, motions = bench_of(), Arm.follow, []
+    follow, motions = Arm.follow, []
 
     def lose(arm, *given):
         follow(arm, *given)
