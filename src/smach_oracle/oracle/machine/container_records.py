@@ -137,13 +137,13 @@ class ContainerRecords:
         self.history.begin_trial()
         self.marks.clear()
         self.streaks.clear()
-        for record in self.by_label.values():
+        for record in list(self.by_label.values()):
             record.begin_trial()
 
     def drop_snapshots(self) -> None:
         """Let go of the userdata that snapshots refer to, and of entries that never came."""
         self.take_up_work()
-        for record in self.by_label.values():
+        for record in list(self.by_label.values()):
             record.snapshot = None
             if record.special:
                 record.forget_entry()

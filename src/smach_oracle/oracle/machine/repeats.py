@@ -31,7 +31,7 @@ def begin_watching(tree: Tree, nodes: Sequence[TreeNode]) -> None:
     tree.numbers_visits = numbers_visits
     for each in nodes:
         is_special = each.is_special()
-        for record in each.records.by_label.values():
+        for record in list(each.records.by_label.values()):
             record.be_special(is_special)
 
 

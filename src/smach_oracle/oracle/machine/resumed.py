@@ -143,7 +143,7 @@ class ResumedTrial:
         return (
             records in self._entries
             or records in self._outcomes
-            or any(record in self._unfinished for record in records.by_label.values())
+            or any(record in self._unfinished for record in list(records.by_label.values()))
         )
 
     def forget(self, records: ContainerRecords) -> None:
@@ -154,6 +154,6 @@ class ResumedTrial:
 
     def forget_states(self, records: ContainerRecords) -> None:
         """Let the coming visits of its states be new ones."""
-        for record in records.by_label.values():
+        for record in list(records.by_label.values()):
             self._unfinished.pop(record, None)
             self._questions.pop(record, None)

@@ -250,8 +250,6 @@ class StateRecord:
         self._tried = _NOTHING_TRIED
         if self._ways.gone is not None:
             self.settle_way(None)
-        if self.special:
-            self.forget_entry()  # of a trial that ended before the visit
         self._visits_before = self._visits + self._by_edges()
 
     @property

@@ -201,7 +201,7 @@ class TreeNode:
         """Go on under these settings with what was learned."""
         self.in_force.use(self.site.settings_here(settings))
         self.records.history.resize(settings.history_length)
-        for label, record in self.records.by_label.items():
+        for label, record in dict(self.records.by_label).items():
             record.configure(self.settings_of(label), self.is_special())
 
     def settings_of(self, label: str) -> StateSettings:

@@ -159,7 +159,7 @@ def read_rates(
     learners = list(learners)
     if is_shared:
         for learner in learners:
-            for record in learner.records.by_label.values():
+            for record in list(learner.records.by_label.values()):
                 record.shared = {}
     try:
         machines = _read(path, 'starting from the priors')

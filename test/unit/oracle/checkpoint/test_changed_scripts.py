@@ -313,6 +313,17 @@ def test_the_question_says_how_old_it_is_and_what_has_changed(folder):
         assert change in text
 
 
+def test_other_keys_of_a_state_are_a_change(folder):
+    def other_keys(diary, points):
+        machine = flat_before(diary, points)
+        machine._states['D'].register_input_keys(['tool'])
+        return machine
+
+    killed_while_it_runs(folder, flat_before, 'B')
+    told = KilledMachine(folder, other_keys).run()
+    assert [line for line in told['log'] if 'state D: keys' in line], told['log']
+
+
 @pytest.mark.parametrize(
     'names, unknown',
     [
