@@ -7,10 +7,12 @@ is the difference of two folders, of before and after it.
 """
 
 import hashlib
+import os
 import re
 import sys
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, Tuple
+from unittest import mock
 
 HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
@@ -154,6 +156,11 @@ PLACES = ('A', 'B', 'ARM/A', 'ARM/B', 'ARM/HAND/A')
 
 def tell() -> Dict[str, List[str]]:
     """Return, for each setting and each place where it may stand, a line for each value."""
+    with mock.patch.dict(os.environ, HOME='/home/ann'):  # '~' in the path of a file
+        return _told()
+
+
+def _told() -> Dict[str, List[str]]:
     told: Dict[str, List[str]] = {}
     for key in sorted({*settings_of(Settings), *settings_of(StateSettings), *GROUPS.top_keys()}):
         told['top {}'.format(key)] = [_line(value, {key: value}) for value in VALUES]
