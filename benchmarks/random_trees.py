@@ -26,7 +26,8 @@ HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / 'test' / 'unit' / 'support'))
 
 MOST_SHOWN = 5
-TREES, CHECKED = 500, 200  # the second with --check. Unit tests execute those of seeds 0 to 199
+# the second with --check, which are always the same. Unit tests have the seeds 0 to 199
+TREES, CHECKED = 500, 200
 
 
 def main() -> int:

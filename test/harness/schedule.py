@@ -3,8 +3,8 @@
 Rostests wait most of their time: for nodes that start, for time to pass, for masters that come
 back. All others compute, and some of them wait as well: for processes that they kill, for the disk.
 Three that wait run beside three that compute. Tests and linters that compute give way
-(`processes.NICE`), so that a rostest finds the machine almost idle, and hardly ever a core is idle:
-beside two that compute a fifth of both cores was. Benchmarks of wall-clock time run alone, at the
+(`processes.NICE`): a rostest then finds the machine almost idle. Hardly ever is a core idle. With
+two that compute, a fifth of both cores was. Benchmarks of wall-clock time run alone, at the
 end.
 """
 

@@ -386,7 +386,7 @@ _SIMPLE: Dict[type, Tuple[str, Callable[[Any], Any]]] = {
     set: ('$set', list),
     frozenset: ('$frozenset', list),
     complex: ('$complex', lambda value: [value.real, value.imag]),
-    OrderedDict: ('$ordered', lambda value: [list(item) for item in list(value.items())]),
+    OrderedDict: ('$ordered', lambda value: [list(item) for item in dict(value).items()]),
 }
 _TAGS: Dict[str, Callable[[Any], Any]] = {
     '$tuple': tuple,

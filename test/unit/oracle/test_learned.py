@@ -161,12 +161,16 @@ def test_later_in_a_streak_a_moved_way_hopes_for_the_chance_of_a_later_place():
     assert round(gain.chance.mean, 3) == later != first
 
 
-def test_who_decides_at_the_limit_of_certain_is_the_same_in_each_program():
+def test_a_gain_at_the_limit_is_judged_alike_in_each_program(monkeypatch):
     """Of 200 draws 181 gain. With another seed it would be 179, and no gain is certain."""
-    gain = _Gain.__new__(_Gain)
-    gain._prices, gain._price = [1.0], 0.69
-    gain._before, gain._later = [Chance(1.5, 5.0)], Chance(1.0, 1.0)
-    gain.chance = Chance(2.7, 3.3)
+    chances = {(AGAIN, FIRST): Chance(1.5, 5.0), (BACK, LATER): Chance(1.0, 1.0)}
+    estimates = Estimates(Evidence((), FAILURE), AGAIN)
+    monkeypatch.setattr(
+        estimates, 'chance', lambda way, place: chances.get((way, place), Chance(2.7, 3.3))
+    )
+    gain = _Gain(Learned(), situation([]), estimates, [AGAIN], BACK)
+    monkeypatch.setattr(gain, '_prices', [1.0])
+    monkeypatch.setattr(gain, '_price', 0.69)
     assert gain.is_certain()
 
 

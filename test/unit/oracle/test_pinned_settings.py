@@ -1,7 +1,7 @@
 """What becomes of each setting with each kind of value does not change: a value, or a refusal.
 
-Where users are meant to see a change, `python3 test/unit/support/pinned_settings.py FOLDER` writes
-all again (test/data/pinned/README.md).
+Where users are meant to see a change, `python3 test/unit/support/pinned_settings.py FOLDER --pin`
+writes all again (test/data/pinned/README.md).
 """
 
 import pinned_settings

@@ -1,7 +1,8 @@
 """What trees drawn at random tell does not change, and is the same for each engine.
 
 A change of the inside leaves it alone. Where users are meant to see one,
-`python3 test/unit/support/pinned_trees.py FOLDER` writes all again (test/data/pinned/README.md).
+`python3 test/unit/support/pinned_trees.py FOLDER --pin` writes all again
+(test/data/pinned/README.md).
 """
 
 import threading

@@ -1,5 +1,6 @@
 """A state that the oracle has entered and that takes much longer than ever before."""
 
+import copy
 import re
 import threading
 
@@ -511,3 +512,26 @@ def test_a_state_that_a_trial_before_was_to_enter_is_come_to_by_itself(monkeypat
     monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
     assert machine.run() == 'done'
     assert [question.failed_state for question in expert.questions] == ['A']
+
+
+def test_a_copy_that_is_made_at_a_jump_was_led_nowhere():
+    def takes_long(state, ud):
+        assert not threading.Event().wait(0.2)  # four times as long as it takes to ask
+        return 'ok'
+
+    expert, copies = FakeExpert(goto('B')), []
+    machine = asked(
+        Scripted('aborted', 'ok'),
+        Scripted(takes_long, takes_long),
+        expert=expert,
+        max_recoveries=0,
+    )
+    machine.machine.events.observers.append(
+        lambda event: (
+            copies.append(copy.copy(machine.machine)) if event.kind is EventKind.JUMP else None
+        )
+    )
+    assert machine.run() == 'done'
+    assert {question.failed_state for question in expert.questions} == {'A', 'B'}
+    del expert.questions[:]
+    assert copies[0].execute() == 'done' and not expert.questions

@@ -112,8 +112,11 @@ def _ended(child, at_stop):
             return status
         try:
             at_stop()
-        finally:
-            os.kill(child, signal.SIGCONT)
+        except BaseException:
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+            raise
+        os.kill(child, signal.SIGCONT)
 
 
 class KilledMachine:

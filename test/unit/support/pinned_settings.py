@@ -1,9 +1,9 @@
 """Every setting with every kind of value, and what becomes of it: taken as what, or refused how.
 
-    python3 test/unit/support/pinned_settings.py FOLDER
+    python3 test/unit/support/pinned_settings.py FOLDER [--pin]
 
-writes that to FOLDER, and the digests to test/data/pinned/settings.txt. What users see of a change
-is the difference of two folders, of before and after it.
+writes that to FOLDER, and with --pin the digests to test/data/pinned/settings.txt. What users see
+of a change is the difference of two folders, of before and after it.
 """
 
 import hashlib
@@ -228,8 +228,8 @@ def digest_of(lines: List[str]) -> str:
     return hashlib.sha256('\n'.join(lines).encode()).hexdigest()[:10]
 
 
-def write(folder: Path) -> None:
-    """Write all lines, and the digests."""
+def write(folder: Path, pins: bool) -> None:
+    """Write all lines. `pins`: the digests, too."""
     folder.mkdir(exist_ok=True)
     told = tell()
     (folder / 'settings.txt').write_text(
@@ -239,10 +239,10 @@ def write(folder: Path) -> None:
         ),
         'utf-8',
     )
-    (FOLDER / 'settings.txt').write_text(
-        ''.join('{}: {}\n'.format(name, digest_of(lines)) for name, lines in told.items()), 'utf-8'
-    )
+    if pins:
+        digests = ['{}: {}\n'.format(name, digest_of(lines)) for name, lines in told.items()]
+        (FOLDER / 'settings.txt').write_text(''.join(digests), 'utf-8')
 
 
 if __name__ == '__main__':
-    write(Path(sys.argv[1]))
+    write(Path(sys.argv[1]), '--pin' in sys.argv)

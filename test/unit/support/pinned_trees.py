@@ -1,9 +1,9 @@
 """Trees drawn at random, and all that they tell. test/data/pinned/trees.txt has the digests of it.
 
-    python3 test/unit/support/pinned_trees.py FOLDER
+    python3 test/unit/support/pinned_trees.py FOLDER [--pin]
 
-writes what each tree tells to FOLDER, and all digests to the file. What users see of a change is
-the difference of two folders, of before and after it.
+writes what each tree tells to FOLDER, and with --pin the digests to that file. What users see of a
+change is the difference of two folders, of before and after it.
 """
 
 import contextlib
@@ -295,8 +295,8 @@ def digests(lines: List[str]) -> str:
     return ' '.join('{} {}'.format(kind, kinds[kind].hexdigest()[:10]) for kind in sorted(kinds))
 
 
-def write(folder: Path) -> None:
-    """Write what all trees tell, a file each, and the digests."""
+def write(folder: Path, pins: bool) -> None:
+    """Write what all trees tell, a file each. `pins`: the digests, too."""
     folder.mkdir(exist_ok=True)
     told = {name_of(number): tell(number) for number in range(TREES)}
     for number in range(KILLED):
@@ -304,9 +304,10 @@ def write(folder: Path) -> None:
             told[name_of(number, 'killed')] = tell_killed(number, Path(store))
     for name, lines in told.items():
         (folder / (name + '.txt')).write_text('\n'.join(lines) + '\n', 'utf-8')
-    (FOLDER / 'trees.txt').write_text(
-        ''.join('{} {}\n'.format(name, digests(lines)) for name, lines in told.items()), 'utf-8'
-    )
+    if pins:
+        (FOLDER / 'trees.txt').write_text(
+            ''.join('{} {}\n'.format(name, digests(lines)) for name, lines in told.items()), 'utf-8'
+        )
 
 
 def name_of(number: int, what: str = 'tree') -> str:
@@ -315,4 +316,4 @@ def name_of(number: int, what: str = 'tree') -> str:
 
 
 if __name__ == '__main__':
-    write(Path(sys.argv[1]))
+    write(Path(sys.argv[1]), '--pin' in sys.argv)

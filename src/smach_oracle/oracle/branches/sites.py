@@ -98,7 +98,7 @@ class BranchSite(Site):
 
     def is_line_over(self, event: Event) -> bool:
         """Whether the branch is over by an event."""
-        return event.kind is EventKind.TRANSITION and not self._node.is_oracle(event.target)
+        return self.ended_by(event) is not None
 
 
 class IteratorSite(BranchSite):

@@ -26,7 +26,7 @@ from .stored_tree import StoredTree
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
 # after these the machine waits until the disk has it
 # not SUPERSEDE: what it counts belongs to the move that follows. Stored without that, it would be
-# counted again by the next program, which asks again
+# counted again by the next program, which asks again. In a branch none follows: its line is over
 _COMMITTED = {
     EventKind.TRIAL_START,
     EventKind.RESUMED,
@@ -163,7 +163,10 @@ class Checkpointer:
         """
         return (
             event.kind in _COMMITTED
-            or node.site.is_line_over(event)
+            or (
+                node.site.is_line_over(event)
+                and not (event.kind is EventKind.SUPERSEDE and _is_on_its_way(node))
+            )
             or event.seq >= self._seq_stored + SEQ_RESERVE - 1
             or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
         )

@@ -129,7 +129,7 @@ def _merge(
             done.append(partial(record.share, before, written))
             states[label] = written
     for learner in learners:
-        for label, learned in learner.records.to_come.items():
+        for label, learned in dict(learner.records.to_come).items():
             containers[learner.relative_path].setdefault(label, learned)
     return done
 

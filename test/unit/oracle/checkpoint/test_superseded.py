@@ -1,9 +1,12 @@
 """A person does by hand what the program was stopped at: SUPERSEDE of whatever is in doubt."""
 
 import json
+import os
+import signal
+import threading
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import KilledMachine, Noted, around
 from killed_trees import ENDS, flat, make, tree
 from left_stores import Left
 
@@ -107,6 +110,75 @@ def test_wherever_it_is_killed_a_failure_is_taken_back_once(tmp_path):
         told = killed.run(expert=ByHand(tmp_path / 'killed' / 'asked'))
         assert told.get('outcome') == 'succeeded', (point, told)
         assert rates(told) == {'A': [0, 0], 'B': [0, 0]}, point
+
+
+class Last(smach.State):
+    """Waits for another state to end. The first program is killed in it."""
+
+    def __init__(self, diary, beside):
+        smach.State.__init__(self, ['succeeded', 'aborted'])
+        self._diary, self._beside = diary, beside
+
+    def execute(self, userdata):
+        assert self._beside.wait(20)
+        self._diary.write('begins', 'LAST')
+        if self._diary.count('begins')['LAST'] == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return 'succeeded'
+
+
+def beside_last(diary, points):
+    """LEFT fails and ends while LAST still runs."""
+    ended = threading.Event()
+    both = smach.Concurrence(
+        ['succeeded', 'aborted'],
+        'aborted',
+        ['done'],
+        ['done'],
+        outcome_map={'succeeded': {'LEFT': 'succeeded', 'LAST': 'succeeded'}},
+        child_termination_cb=lambda outcomes: ended.set() or False,
+    )
+    with both:
+        smach.Concurrence.add('LEFT', Noted('LEFT', diary, points, failures=1))
+        smach.Concurrence.add('LAST', Last(diary, ended))
+    return around('BOTH', both, ENDS)
+
+
+def items_before_last(diary, points):
+    """Of two items the second one fails."""
+
+    class Failing(Noted):
+        def execute(self, userdata):
+            return 'aborted' if userdata.item == 2 else super().execute(userdata)
+
+    ended = threading.Event()
+    ended.set()
+    items = smach.Iterator(
+        ['succeeded', 'aborted'],
+        ['done'],
+        ['done'],
+        it=[1, 2],
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
+    with items:
+        smach.Iterator.set_contained_state(
+            'LEFT', Failing('LEFT', diary, points, keys=('done', 'item')), ['succeeded']
+        )
+    return around('ITEMS', items, dict(ENDS, succeeded='LAST'), LAST=Last(diary, ended))
+
+
+@pytest.mark.parametrize(
+    'build, rate', [(beside_last, [0, 0]), (items_before_last, [1, 0])], ids=['branch', 'item']
+)
+def test_what_is_superseded_beside_others_is_not_asked_about_again(tmp_path, build, rate):
+    killed = KilledMachine(tmp_path, build, max_recoveries=0, on_resume='recover')
+    assert killed.run(expert=ByHand(tmp_path / 'first')) is None
+    told = killed.run(expert=ByHand(tmp_path / 'again'))
+    assert told.get('outcome') == 'succeeded', told
+    assert [path for path in asked(tmp_path / 'first') if path.endswith('/LEFT')]
+    assert not [path for path in asked(tmp_path / 'again') if path.endswith('/LEFT')]
+    assert rates(told)['LEFT'] == rate
 
 
 def test_a_failure_that_was_asked_about_is_taken_back_once(tmp_path):
