@@ -156,7 +156,7 @@ PLACES = ('A', 'B', 'ARM/A', 'ARM/B', 'ARM/HAND/A')
 
 def tell() -> Dict[str, List[str]]:
     """Return, for each setting and each place where it may stand, a line for each value."""
-    with mock.patch.dict(os.environ, HOME='/home/ann'):  # '~' in the path of a file
+    with mock.patch.dict(os.environ, HOME='/ann'):  # '~' in the path of a file
         return _told()
 
 
