@@ -5,17 +5,21 @@ writes all again (test/data/pinned/README.md).
 """
 
 import pinned_settings
+import pytest
 from pinned import held
 
 
-def test_settings_are_taken_and_refused_as_they_were():
-    told = pinned_settings.tell()
+@pytest.fixture(scope='module')
+def told():
+    return pinned_settings.tell()
+
+
+def test_settings_are_taken_and_refused_as_they_were(told):
     found = ['{}: {}'.format(name, pinned_settings.digest_of(told[name])) for name in told]
     assert found == held('settings')
 
 
-def test_they_are_told_in_full():
-    told = pinned_settings.tell()
+def test_they_are_told_in_full(told):
     refused = (
         'True: refused: memory: True is not allowed; allowed: a whole number of results from 1'
     )

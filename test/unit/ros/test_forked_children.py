@@ -98,7 +98,9 @@ def test_children_start_and_end_as_without_an_oracle(kept_in, warm_python, kind,
     assert paths['']
 
 
-def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(script, tmp_path):
+def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(
+    script, kept_in, tmp_path
+):
     path = script("""
         class Start(smach.State):
             def __init__(self):
@@ -114,16 +116,7 @@ def test_a_child_that_outlives_its_program_holds_neither_its_bag_nor_its_store(s
         top.execute()
         """)
     program = subprocess.Popen(
-        [
-            sys.executable,
-            '-c',
-            RUNNER,
-            '--record',
-            str(tmp_path / 'bags'),
-            '--checkpoint',
-            str(tmp_path / 'store'),
-            path,
-        ],
+        [sys.executable, *kept_in, path],
         stdout=subprocess.PIPE,
         env=ENVIRONMENT,
     )

@@ -82,6 +82,21 @@ def around(label, container, leads_to, **others):
     return machine
 
 
+def each_of(items, label, state):
+    """An Iterator over items, of a state that has the key `item`."""
+    iterator = smach.Iterator(
+        ['succeeded', 'aborted'],
+        ['done'],
+        ['done'],
+        it=items,
+        it_label='item',
+        exhausted_outcome='succeeded',
+    )
+    with iterator:
+        smach.Iterator.set_contained_state(label, state, loop_outcomes=['succeeded'])
+    return iterator
+
+
 def in_a_process(work, at_stop=None):
     """Run `work()` in a process of its own; return what it has told, None if it was killed.
 

@@ -2,7 +2,7 @@
 
 import shutil
 
-from killed_machines import Noted
+from killed_machines import Noted, each_of
 
 import smach
 
@@ -43,26 +43,8 @@ def tree(diary, points):
     with both:
         smach.Concurrence.add('LEFT', noted('LEFT'))
         smach.Concurrence.add('RIGHT', two('M1', 'M2'))
-    plain = smach.Iterator(
-        ['succeeded', 'aborted'],
-        ['done'],
-        ['done'],
-        it=range(3),
-        it_label='item',
-        exhausted_outcome='succeeded',
-    )
-    with plain:
-        smach.Iterator.set_contained_state('I', noted('I', 'item'), loop_outcomes=['succeeded'])
-    nested = smach.Iterator(
-        ['succeeded', 'aborted'],
-        ['done'],
-        ['done'],
-        it=[1, 2],
-        it_label='item',
-        exhausted_outcome='succeeded',
-    )
-    with nested:
-        smach.Iterator.set_contained_state('JK', two('J', 'K', 'item'), loop_outcomes=['succeeded'])
+    plain = each_of(range(3), 'I', noted('I', 'item'))
+    nested = each_of([1, 2], 'JK', two('J', 'K', 'item'))
     machine = smach.StateMachine(['succeeded', 'aborted'])
     machine.userdata.done = []
     with machine:

@@ -68,7 +68,6 @@ NOT_TOLD = (
 )
 KEY = re.compile(r'"(\w+)": ')
 ID = re.compile(r'\b[0-9a-f]{12}\b')
-QUESTION = re.compile(r'#-\d+')
 CUT_AT = ('Traceback (most', ' with userdata:', 'InvalidStateError: A ')  # each engine's own
 NUMBER = re.compile(r'-?\d+\.\d+(?:e-?\d+)?')
 
@@ -266,8 +265,6 @@ def _plain(value: Any) -> Any:
 @contextlib.contextmanager
 def _logged(note: Callable[[str, str], None]) -> Iterator[None]:
     """Pass on what the executive logs, not what an engine does."""
-    names = ('loginfo', 'logwarn', 'logerr')
-    before = {name: getattr(smach, name) for name in names}
 
     def noting(name: str) -> Callable[[Any], None]:
         def log(text: Any) -> None:
@@ -277,13 +274,9 @@ def _logged(note: Callable[[str, str], None]) -> Iterator[None]:
 
         return log
 
-    for name in names:
-        setattr(smach, name, noting(name))
-    try:
+    loggers = {name: noting(name) for name in ('loginfo', 'logwarn', 'logerr')}
+    with mock.patch.multiple(smach, **loggers):
         yield
-    finally:
-        for name in names:
-            setattr(smach, name, before[name])
 
 
 def digests(lines: List[str]) -> str:

@@ -6,7 +6,7 @@ import signal
 import threading
 
 import pytest
-from killed_machines import KilledMachine, Noted, around
+from killed_machines import KilledMachine, Noted, around, each_of
 from killed_trees import ENDS, flat, make, tree
 from left_stores import Left
 
@@ -153,18 +153,8 @@ def items_before_last(diary, points):
 
     ended = threading.Event()
     ended.set()
-    items = smach.Iterator(
-        ['succeeded', 'aborted'],
-        ['done'],
-        ['done'],
-        it=[1, 2],
-        it_label='item',
-        exhausted_outcome='succeeded',
-    )
-    with items:
-        smach.Iterator.set_contained_state(
-            'LEFT', Failing('LEFT', diary, points, keys=('done', 'item')), ['succeeded']
-        )
+    failing = Failing('LEFT', diary, points, keys=('done', 'item'))
+    items = each_of([1, 2], 'LEFT', failing)
     return around('ITEMS', items, dict(ENDS, succeeded='LAST'), LAST=Last(diary, ended))
 
 
