@@ -31,6 +31,13 @@ def test_trees_tell_the_same_as_ever(first):
         assert pinned_trees.digests(pinned_trees.tell(number)) == PINNED[name], name
 
 
+@pytest.mark.parametrize('first', range(0, pinned_trees.OPERATED, 20))
+def test_trees_and_their_operators_tell_the_same_as_ever(first):
+    for number in range(first, first + 20):
+        name = pinned_trees.name_of(number, 'operated')
+        assert pinned_trees.digests(pinned_trees.tell_operated(number)) == PINNED[name], name
+
+
 @pytest.mark.parametrize('number', range(pinned_trees.KILLED))
 def test_killed_trees_have_stored_and_tell_the_same_as_ever(number, tmp_path):
     name = pinned_trees.name_of(number, 'killed')
@@ -38,4 +45,4 @@ def test_killed_trees_have_stored_and_tell_the_same_as_ever(number, tmp_path):
 
 
 def test_each_digest_has_its_tree():
-    assert len(PINNED) == pinned_trees.TREES + pinned_trees.KILLED
+    assert len(PINNED) == pinned_trees.TREES + pinned_trees.OPERATED + pinned_trees.KILLED

@@ -14,6 +14,7 @@ import random
 import re
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, Optional
 from unittest import mock
@@ -34,22 +35,26 @@ import smach
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
 from smach_oracle.oracle.decision.policies import POLICIES
-from smach_oracle.oracle.execution import visiting
-from smach_oracle.oracle.machine.nesting import records_of
+from smach_oracle.oracle.errors import OperatorError
+from smach_oracle.oracle.execution import trial, visiting
+from smach_oracle.oracle.machine.nesting import nodes_of, records_of
 from smach_oracle.oracle.machine.oracle import oracle_of
+from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.prospects import prospects_of
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
-TREES, KILLED = 160, 40
+TREES, OPERATED, KILLED = 160, 60, 40
 IN_ORDER = Shape(depth=3, concurrent=False, time_limits=False)  # one thing at a time
 BESIDE = UPSTREAM._replace(depth=3, time_limits=False)  # in every fourth tree
 TRIALS = 3
+MOST_COMMANDS = 15  # in a trial, or an operator might send a machine round for ever
 RESUMES = ('recover', 'ask', 'recover', 'restart')
 # by the first word of a line; all others are events
 KINDS = dict(
     {'QUESTION': 'questions', 'INTERFACE': 'questions', '=': 'outcomes', 'PROSPECT': 'prospects'},
+    **dict.fromkeys(('COMMAND', 'STATUS'), 'operator'),
     **dict.fromkeys(('INFO', 'WARN', 'ERR'), 'log'),
     **dict.fromkeys(('RATES', 'TRANSITIONS', 'WAYS'), 'learned'),
     **dict.fromkeys(('MOMENT', 'WHOLE', 'CONTAINER'), 'store'),
@@ -79,6 +84,7 @@ class Told(Executed):
         self.lines: List[str] = []
         self._more = settings
         super().__init__(plan)
+        trial._tell_once.cache_clear()  # what is said once in a process, each tree says
         oracle_of(self.machine).clock = FakeClock()
         self.machine.events.observers.append(self._tell)
 
@@ -110,6 +116,83 @@ class Told(Executed):
             self.tell('TRANSITIONS', sorted(self.machine.transition_counts()))
             for record in records_of(self.machine._oracle):
                 self.tell('WAYS ' + record.label, record.ways_so_far())
+
+
+class Operated(Told):
+    """A tree whose operator gives commands at random, before its trials and at its events.
+
+    The commands come in the thread of the machine, with its lock free: so they come at the same
+    moments each time. What waits is let go in the end.
+    """
+
+    def __init__(self, plan: TreePlan) -> None:
+        super().__init__(plan)
+        self._hand = OperatorHand(self.machine)
+        self._chance = random.Random(plan.seed + ' operated')
+        nodes = nodes_of(self.machine)
+        self._places = [(node.path, label) for node in nodes for label in node.labels()]
+        self._left = 0
+
+    def execute(self) -> str:
+        self._left = MOST_COMMANDS
+        while self._chance.random() < 0.5:
+            self._command()
+        return super().execute()
+
+    def _tell(self, event: Any) -> None:
+        super()._tell(event)
+        if event.kind is EventKind.STATE_START and self._chance.random() < 0.4:
+            self._command()
+        elif event.kind is EventKind.HOLD_START:
+            while self._holds() and self._left > 0 and self._chance.random() < 0.8:
+                self._command()
+            for let_go in (self._hand.resume, self._hand.confirm):
+                if self._holds():
+                    self._say(partial(let_go, by='eva'))
+
+    def _holds(self) -> bool:
+        return any(each.held_by for each in self._hand.status().active)
+
+    def _command(self) -> None:
+        """Give one command, and tell the reply."""
+        self._left -= 1
+        if self._left < 0:
+            return
+        hand, chance = self._hand, self._chance
+        path, label = chance.choice(self._places)
+        pattern = chance.choice((label, '{}/{}'.format(path, label), '**/' + label, '*', 'NONE'))
+        by = chance.choice(('', 'eva'))
+        commands: List[Callable[[], str]] = [
+            lambda: hand.pause(by),
+            lambda: hand.resume(by),
+            lambda: hand.step(chance.choice(('', path, 'nowhere')), by),
+            lambda: hand.confirm(chance.choice(('', path)), by),
+            lambda: hand.set_breakpoint(pattern, by),
+            lambda: hand.remove_breakpoint(
+                chance.choice((pattern, *hand.status().breakpoints)), by
+            ),
+            lambda: hand.set_autonomy(
+                pattern, chance.choice(('run', 'announce', 'confirm', '', 'alone')), by
+            ),
+            lambda: hand.go_to(
+                chance.choice((path, path, '', 'nowhere')),
+                label,
+                by,
+                chance.random() < 0.5,
+                chance.choice(((), ('a', 'b'))),
+            ),
+        ]
+        if chance.random() < 0.04:
+            commands = [lambda: hand.preempt(by)]
+        self._say(chance.choice(commands))
+        self.tell('STATUS', hand.status())
+
+    def _say(self, command: Callable[[], str]) -> None:
+        try:
+            said = command()
+        except OperatorError as refused:
+            said = 'refused: {}'.format(refused)
+        self.tell('COMMAND', said)
 
 
 class _Asked(Expert):
@@ -159,6 +242,13 @@ def tell(number: int) -> List[str]:
     for each in prospects_of(told.machine):
         told.tell('PROSPECT', each._replace(settings=None))
     return sorted(told.lines) if is_beside(number) else told.lines
+
+
+def tell_operated(number: int) -> List[str]:
+    """Return what a tree and its operator tell in some trials."""
+    told = Operated(plan_of(number))
+    told.run(TRIALS)
+    return told.lines
 
 
 def tell_killed(number: int, folder: Path) -> List[str]:
@@ -292,6 +382,8 @@ def write(folder: Path, pins: bool) -> None:
     """Write what all trees tell, a file each. `pins`: the digests, too."""
     folder.mkdir(exist_ok=True)
     told = {name_of(number): tell(number) for number in range(TREES)}
+    for number in range(OPERATED):
+        told[name_of(number, 'operated')] = tell_operated(number)
     for number in range(KILLED):
         with tempfile.TemporaryDirectory() as store:
             told[name_of(number, 'killed')] = tell_killed(number, Path(store))
