@@ -191,6 +191,32 @@ def test_a_damaged_file_is_kept_aside_also_while_the_machine_runs(tmp_path, log)
     assert learned(path, 'TASK') == (1, 1)
 
 
+@pytest.mark.parametrize(
+    'estimator, key, value',
+    [
+        ('window', 'failures', float('inf')),
+        ('window', 'successes', '3'),
+        ('window', 'window', ['x']),
+        ('exponential', 'rate', float('nan')),
+    ],
+)
+def test_what_another_program_has_written_and_nobody_can_read_is_replaced(
+    tmp_path, log, estimator, key, value
+):
+    path = tmp_path / 'rates.json'
+    running = machine(path, 'PICK', ['aborted', 'ok', 'ok'], estimator=estimator)
+    running.run()
+    content = json.loads(path.read_text())
+    content['machines']['PICK']['']['A'].update({'successes': 9, key: value})
+    path.write_text(json.dumps(content))
+    running.run()
+    assert learned(path, 'PICK') == (2, 1), 'as this machine has learned'
+    assert any("'A' of PICK cannot be used: " in str(said) for said in log)
+    again = machine(path, 'PICK', [], estimator=estimator)
+    again.run()
+    assert again.rate('A').rate == pytest.approx(running.rate('A').rate, abs=0.2)
+
+
 HAMMER = """
 import sys
 sys.path[:0] = {path!r}

@@ -109,7 +109,7 @@ class Told(Executed):
 
         No state takes any time: who is slow on a busy computer would be a dearer way.
         """
-        with _logged(self.tell), mock.patch.object(visiting, 'monotonic', lambda: 0.0):
+        with logged(self.tell), mock.patch.object(visiting, 'monotonic', lambda: 0.0):
             for _ in range(trials):
                 self.lines.append('= {}'.format(self.execute()))
             self.tell('RATES', self.machine.rates())
@@ -353,7 +353,7 @@ def _plain(value: Any) -> Any:
 
 
 @contextlib.contextmanager
-def _logged(note: Callable[[str, str], None]) -> Iterator[None]:
+def logged(note: Callable[[str, str], None]) -> Iterator[None]:
     """Pass on what the executive logs, not what an engine does."""
 
     def noting(name: str) -> Callable[[Any], None]:

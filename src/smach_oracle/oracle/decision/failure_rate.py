@@ -149,9 +149,7 @@ class FailureRate(_Totals):
         :raises ValueError: where it is no snapshot.
         """
         successes, failures = _totals(learned)
-        window = learned.get('window', []) if learned.get('estimator') == self.kind else []
-        if not isinstance(window, list) or any(result not in (0, 1) for result in window):
-            raise ValueError('window: {!r} is not a list of 0 and 1'.format(window))
+        window = _window(learned) if learned.get('estimator') == self.kind else []
         window = window[-self.memory :]
         self.successes, self.failures = successes, failures
         self._results = len(window)
@@ -218,12 +216,9 @@ class ExponentialFailureRate(_Totals):
         :raises ValueError: where it is no snapshot.
         """
         successes, failures = _totals(learned)
-        rate = (
-            learned.get('rate', self.prior) if learned.get('estimator') == self.kind else self.prior
-        )
-        if not is_number(rate, 0, 1):
-            raise ValueError('rate: {!r} is not from 0 to 1'.format(rate))
-        self.successes, self.failures, self._rate = successes, failures, float(rate)
+        is_own = learned.get('estimator') == self.kind
+        rate = _rate(learned, self.prior) if is_own else self.prior
+        self.successes, self.failures, self._rate = successes, failures, rate
 
 
 def _totals(learned: Learned) -> Tuple[int, int]:
@@ -231,6 +226,20 @@ def _totals(learned: Learned) -> Tuple[int, int]:
     if not all(is_whole(total, 0) for total in totals):
         raise ValueError('successes, failures: {!r} are not counts'.format(totals))
     return totals
+
+
+def _window(learned: Learned) -> List[int]:
+    window = learned.get('window', [])
+    if not isinstance(window, list) or any(result not in (0, 1) for result in window):
+        raise ValueError('window: {!r} is not a list of 0 and 1'.format(window))
+    return window
+
+
+def _rate(learned: Learned, usual: float) -> float:
+    rate = learned.get('rate', usual)
+    if not is_number(rate, 0, 1):
+        raise ValueError('rate: {!r} is not from 0 to 1'.format(rate))
+    return float(rate)
 
 
 Estimator = Union[FailureRate, ExponentialFailureRate]
@@ -280,21 +289,23 @@ def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapsh
     failures = own['failures'] - base.get('failures', 0)
     if base and base == base_of(theirs):
         return dict(own)
+    their_successes, their_failures = _totals(theirs)
     result = dict(
         own,
-        successes=max(0, int(theirs['successes']) + successes),
-        failures=max(0, int(theirs['failures']) + failures),
+        successes=max(0, their_successes + successes),
+        failures=max(0, their_failures + failures),
     )
     if theirs['estimator'] != own['estimator']:
         return result
     new = max(0, successes) + max(0, failures)
     if 'window' in own:
         result['window'] = (
-            _without(list(theirs['window']), -failures) + _latest(own['window'], new, failures)
+            _without([*_window(theirs)], -failures) + _latest(own['window'], new, failures)
         )[-memory:]
     else:
         left = (1.0 - 1.0 / memory) ** new
-        rate = own['rate'] + left * (theirs['rate'] - base.get('rate', own['rate']))
+        theirs_since = _rate(theirs, own['rate']) - base.get('rate', own['rate'])
+        rate = own['rate'] + left * theirs_since
         result['rate'] = min(1.0, max(0.0, rate))
     return result
 
