@@ -45,7 +45,7 @@ from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
-TREES, OPERATED, KILLED = 160, 60, 40
+TREES, OPERATED, KILLED = 160, 60, 96
 IN_ORDER = Shape(depth=3, concurrent=False, time_limits=False)  # one thing at a time
 BESIDE = UPSTREAM._replace(depth=3, time_limits=False)  # in every fourth tree
 TRIALS = 3
@@ -74,6 +74,8 @@ NOT_TOLD = (
 KEY = re.compile(r'"(\w+)": ')
 ID = re.compile(r'\b[0-9a-f]{12}\b')
 CUT_AT = ('Traceback (most', ' with userdata:', 'InvalidStateError: A ')  # each engine's own
+# of moments and events, which threads beside each other draw
+DRAWN = re.compile(r'\b(MOMENT|number:|seq:|after:) \d+')
 NUMBER = re.compile(r'-?\d+\.\d+(?:e-?\d+)?')
 
 
@@ -252,10 +254,13 @@ def tell_operated(number: int) -> List[str]:
 
 
 def tell_killed(number: int, folder: Path) -> List[str]:
-    """Return what is in the store of a tree that was killed at one of its events, and what the
+    """Return what is in the store of a tree that was killed at one of its moments, and what the
     tree tells when it is begun again.
+
+    One that may have Concurrences is killed as a leaf begins: then all other threads wait.
     """
-    plan = plan_of(number)
+    beside = is_beside(number)
+    plan = plan_of(number, BESIDE if beside else IN_ORDER)
     settings = {
         'checkpoint': str(folder / 'robot.db'),
         'checkpoint_synchronous': 'OFF',
@@ -263,26 +268,27 @@ def tell_killed(number: int, folder: Path) -> List[str]:
         'on_resume': RESUMES[number % len(RESUMES)],
     }
 
-    def events() -> int:
-        told = Told(plan)
-        told.run(1)
-        return sum(line.split()[0] in EventKind.__members__ for line in told.lines)
-
-    dies_at = random.Random(plan.seed + ' killed').randrange(2, in_a_process(events) + 1)
-
-    def killed() -> None:
+    def run(points: Points, **settings: Any) -> int:
         told = Told(plan, **settings)
-        told.machine.events.observers.append(Points(dies_at))
+        if beside:
+            told.world.at_entry = points
+        else:
+            told.machine.events.observers.append(points)
         told.run(1)
+        return points.passed
 
     def resumed() -> List[str]:
         told = Told(plan, **settings)
         told.run(2)
         return told.lines
 
-    assert in_a_process(killed) is None
+    points = in_a_process(lambda: run(Points(0)))
+    first = 1 if beside else 2
+    dies_at = random.Random(plan.seed + ' killed').randrange(first, points + 1)
+    assert in_a_process(lambda: run(Points(dies_at), **settings)) is None
     stored = _stored(str(folder / 'robot.db'))
-    return stored + [line.replace(str(folder), '.') for line in in_a_process(resumed)]
+    lines = stored + [line.replace(str(folder), '.') for line in in_a_process(resumed)]
+    return sorted(DRAWN.sub(r'\1', line) for line in lines) if beside else lines
 
 
 def _stored(path: str) -> List[str]:

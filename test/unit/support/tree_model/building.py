@@ -23,6 +23,7 @@ class World:
         self.signal = threading.Event()  # set at the leafs' entry of that number
         self.signals_at = 0
         self.patience_s = PREEMPT_S
+        self.at_entry: Callable[[], None] = lambda: None  # is called as a leaf begins
         self.begin_trial()
 
     def begin_trial(self) -> None:
@@ -58,6 +59,7 @@ class World:
         if self._entries == self.signals_at:
             self.signal.set()
         self.tell(path, ('ENTRY', label, tuple(sorted(seen.items()))))
+        self.at_entry()
 
 
 class Scripted(smach.State):
