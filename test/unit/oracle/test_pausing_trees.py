@@ -170,3 +170,18 @@ def test_the_minutes_of_the_trial_stand_still() -> None:
         assert held.end() == 'done'  # there was time left to recover
     assert not gate.entered.is_set()
     assert len(held.of(EventKind.JUMP)) == 1
+
+
+def test_a_resume_behind_a_sending_names_each_branch_once() -> None:
+    held = Held(beside(L=chain_of(Scripted(), Scripted()), R=chain_of(Scripted())))
+    held.hand.pause()
+    held.hand.set_autonomy('SM_ROOT/BOTH/R/A', 'confirm')
+    with held.begin():
+        held.waits_before('SM_ROOT/BOTH')
+        held.hand.step()
+        held.waits_before('SM_ROOT/BOTH/L/A', 'SM_ROOT/BOTH/R/A')
+        held.hand.go_to('SM_ROOT/BOTH/L', 'B')
+        said = held.hand.resume()
+        assert said == 'runs now: B in SM_ROOT/BOTH/L; still to be confirmed: A in SM_ROOT/BOTH/R'
+        held.hand.confirm()
+        assert held.end() == 'done'

@@ -1,6 +1,8 @@
 """What is kept out of a store."""
 
-from killed_machines import Diary, KilledMachine, Noted
+import threading
+
+from killed_machines import Diary, KilledMachine, Noted, around, each_of
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -9,13 +11,14 @@ ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
 
 
 class Opens(smach.State):
-    """Writes an open file, which no codec knows."""
+    """Writes what no codec knows, an open file by default."""
 
-    def __init__(self):
+    def __init__(self, make=lambda: open('/dev/null')):
         smach.State.__init__(self, ['succeeded'], [], ['file'])
+        self._make = make
 
     def execute(self, userdata):
-        userdata.file = open('/dev/null')
+        userdata.file = self._make()
         return 'succeeded'
 
 
@@ -27,7 +30,8 @@ def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp
     machine.userdata.mine = open('/dev/null')
     with machine:
         smach.StateMachine.add('A', Opens(), {'succeeded': 'AGAIN'}, remapping={'file': 'other'})
-        smach.StateMachine.add('AGAIN', Opens(), {'succeeded': 'IN'}, remapping={'file': 'other'})
+        again = Opens(threading.Lock)
+        smach.StateMachine.add('AGAIN', again, {'succeeded': 'IN'}, remapping={'file': 'other'})
         smach.StateMachine.add('IN', inner, {'succeeded': 'succeeded'})
     OracleContainer.wrap(
         machine, name='TOP', settings={'checkpoint': str(tmp_path / 'robot.db')}
@@ -113,6 +117,27 @@ def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     ).execute()
     named = [text for level, text in log if level == 'warn' and 'begins again' in text]
     assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')
+
+
+def test_an_iterator_that_cannot_go_on_begins_with_its_first_item_again(tmp_path):
+    def build(diary, points):
+        first, second = (Noted(name, diary, points, keys=('done', 'item')) for name in 'AB')
+        inner = smach.StateMachine(['succeeded', 'aborted'], ['done', 'item'], ['done'])
+        with inner:
+            smach.StateMachine.add('A', first, {'succeeded': 'B'})
+            smach.StateMachine.add('B', second, ENDS)
+        return around('ALL', each_of(iter([1, 2, 3]), 'EACH', inner), ENDS)
+
+    machine = KilledMachine(tmp_path, build)
+    whole = machine.run()
+    for number in range(whole['points'] // 2, whole['points'] - 6, 3):  # the first one is done
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        machine = KilledMachine(folder, build)
+        assert machine.run(number) is None
+        told = machine.run()
+        assert (told['outcome'], told['done']) == ('succeeded', whole['done'])
+        assert machine.diary.count('ends')['A1'] == 2
 
 
 def test_a_value_that_goes_up_through_containers_is_named_once(tmp_path, log):
