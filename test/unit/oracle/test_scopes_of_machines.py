@@ -181,8 +181,8 @@ def test_of_a_machine_that_is_left_behind_nothing_else_counts():
     with inside(run):
         node.execution.look_around()
     machine.machine.request_preempt()
-    assert node.execution.scope.reason is Reason.PREEMPTED and not node.is_left_behind()
+    assert node.execution.scope.reason is Reason.PREEMPTED and not node.execution.is_left_behind()
     run.cancel(Reason.LEFT_BEHIND)
-    assert node.execution.scope.reason is Reason.LEFT_BEHIND and node.is_left_behind()
+    assert node.execution.scope.reason is Reason.LEFT_BEHIND and node.execution.is_left_behind()
     node.tree.early_end.keep()
     assert node.execution.scope.reason is Reason.EARLY_END

@@ -137,7 +137,7 @@ def take_departure(node: TreeNode) -> Optional[Departure]:
     departure = cast(Departure, node.execution.departure)
     node.execution.depart_by(None)
     stops = departure.arrives_at.execution.scope.reason is not None
-    return None if stops or node.is_left_behind() else departure
+    return None if stops else departure
 
 
 def is_settled(node: TreeNode, failure: Failure) -> bool:

@@ -247,7 +247,7 @@ class Step:
         `why`: see `_why_unwell`.
         """
         node, record = self._node, self._record
-        if node.is_left_behind():
+        if node.execution.is_left_behind():
             return stop_left_behind(node)
         if self._author_recovers(failure):
             if not why:

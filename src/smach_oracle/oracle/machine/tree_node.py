@@ -161,13 +161,6 @@ class TreeNode:
             above = above.parent
         return ''
 
-    def is_left_behind(self) -> bool:
-        """Whether this container is to stop without an outcome, as nobody waits for one.
-
-        It executes inside a state that was abandoned, or its trial has ended early.
-        """
-        return self.execution.is_left_behind()
-
     def why_left_behind(self) -> str:
         """Say why, where it is left behind."""
         return (
