@@ -90,19 +90,18 @@ def branches() -> smach.StateMachine:
     return machine
 
 
+# wanted: 2.5, and 1.15 for a Concurrence. The limits are a fifth to a third above what is reached on
+# a busy machine: 2.9, 2.5, 2.9 and 1.2. Another processor may have another ratio
 ROWS = (
-    # wanted: 2.5. Not reached: a limit of what is reached and a fifth, on a busy machine 2.8, 3.5
-    # and, with less than a fifth, 4.5
     Row('item of a plain state', lambda: items_of(Fixed('ok')), ITEMS, 3.4),
-    Row('item of a machine', lambda: items_of(small()), ITEMS, 4.2),
+    Row('item of a machine', lambda: items_of(small()), ITEMS, 3.3),
     Row(
         'small machine',
         lambda: chain(**{'S{}'.format(number): small() for number in range(NESTED)}),
         NESTED,
-        4.9,
+        3.8,
     ),
-    # wanted: 1.15. Not reached: 1.3
-    Row('Concurrence of five', branches, REPEATS, 1.6),
+    Row('Concurrence of five', branches, REPEATS, 1.45),
 )
 
 

@@ -23,7 +23,8 @@ from quiet import in_bare_steps, silence
 import smach
 from smach_oracle.oracle import OracleContainer
 
-# in bare steps. The aims are missed, by 2 and by 3. The limits are what is reached and a fifth.
+# in bare steps. The aims are missed, by 2 and by up to 4. The limits are a sixth above what is
+# measured on a busy machine, 12.4 and 44
 AIM, LIMIT = 10.0, in_bare_steps(14.4)
 OBSERVED_AIM, OBSERVED_LIMIT = 40.0, in_bare_steps(51.0)
 DEPTH = 3
