@@ -90,8 +90,8 @@ def branches() -> smach.StateMachine:
     return machine
 
 
-# wanted: 2.5, and 1.15 for a Concurrence. The limits are a fifth to a third above what is reached on
-# a busy machine: 2.9, 2.5, 2.9 and 1.2. Another processor may have another ratio
+# wanted: 2.5, and 1.15 for a Concurrence. The limits are a fifth to a third above what is reached
+# on a busy machine: 2.9, 2.5, 2.9 and 1.2. Another processor may have another ratio
 ROWS = (
     Row('item of a plain state', lambda: items_of(Fixed('ok')), ITEMS, 3.4),
     Row('item of a machine', lambda: items_of(small()), ITEMS, 3.3),

@@ -49,7 +49,7 @@ TREES, OPERATED, KILLED = 160, 60, 96
 IN_ORDER = Shape(depth=3, concurrent=False, time_limits=False)  # one thing at a time
 BESIDE = UPSTREAM._replace(depth=3, time_limits=False)  # in every fourth tree
 TRIALS = 3
-MOST_COMMANDS = 15  # in a trial, or an operator might send a machine round for ever
+MOST_COMMANDS = 15  # in a trial: an operator could send a machine round without end
 RESUMES = ('recover', 'ask', 'recover', 'restart')
 # by the first word of a line; all others are events
 KINDS = dict(
