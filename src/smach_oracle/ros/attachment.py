@@ -30,6 +30,7 @@ import rospy
 import smach
 from smach_common.introspection.container_watch import CALLBACK_LISTS, is_watched
 from smach_common.introspection.introspection_server import IntrospectionServer
+from smach_common.node_end import end_quietly
 from smach_oracle.forking import in_child
 from smach_oracle.msg import (
     ConsoleCommand,
@@ -244,6 +245,7 @@ class Attachments:
         self._node_started = True
         self.work_clock = clock_of_work(private_text('pass_time'))
         start_master_watch()
+        end_quietly()
         log_through_rospy()
         track_goals_from_the_start()
         rospy.on_shutdown(self._on_shutdown)

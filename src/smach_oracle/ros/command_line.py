@@ -10,6 +10,7 @@ from typing import Any, Iterator
 import rosgraph
 import rospy
 
+from smach_common.node_end import end_quietly
 from smach_common.node_probe import TimedTransport
 
 ANSWER_S = 2.0  # that a node of the same name has to show that it runs
@@ -19,9 +20,10 @@ OWN_NAME = '__name:='
 def parameters_only(description: str) -> None:
     """Answer --help, and refuse any other argument that is not a ROS remapping.
 
-    Both work without a master.
+    Both work without a master. The node will end quietly.
     """
     argparse.ArgumentParser(description=description).parse_args(rospy.myargv()[1:])
+    end_quietly()
 
 
 def init_beside_others(name: str) -> None:
@@ -30,6 +32,7 @@ def init_beside_others(name: str) -> None:
     ROS would end the other one. This node takes the name with a number then, `expert_console_2`,
     with the parameters that were set for the name it gave up.
     """
+    end_quietly()
     wanted = next((arg[len(OWN_NAME) :] for arg in sys.argv if arg.startswith(OWN_NAME)), name)
     free = _free_name(wanted)
     if free == wanted:

@@ -10,6 +10,7 @@ import rospy
 from rich.console import Console
 from rich.text import Text
 
+from smach_common.node_end import end_quietly
 from smach_oracle.msg import ExpertDecision, OpenQuery
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.ros.expert.open_questions import is_unknown
@@ -396,6 +397,7 @@ def main() -> None:
     except KeyboardInterrupt:
         return
     start_master_watch()
+    end_quietly()
     operator = OperatorCommands(options_given.name)
     repeat(operator.look_up, LOOK_UP_PERIOD_S)
     Terminal(

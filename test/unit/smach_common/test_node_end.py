@@ -1,0 +1,34 @@
+"""The server of a node that ends, as rospy has it."""
+
+import threading
+import xmlrpc.client
+
+from rosgraph.xmlrpc import XmlRpcHandler, XmlRpcNode
+
+from smach_common.node_end import end_quietly
+
+
+class Handler(XmlRpcHandler):
+    def __init__(self):
+        self.ready = threading.Event()
+
+    def _ready(self, uri):
+        self.ready.set()
+
+    def getPid(self):
+        return 42
+
+
+def test_its_thread_ends_with_it_and_not_before():
+    end_quietly()
+    handler = Handler()
+    node = XmlRpcNode(0, handler)
+    thread = threading.Thread(target=node.run, daemon=True)
+    thread.start()
+    assert handler.ready.wait(10.0)
+    with xmlrpc.client.ServerProxy(node.uri) as asked:
+        assert [asked.getPid() for _ in range(3)] == [42] * 3
+    assert thread.is_alive()
+    node.shutdown('the end')
+    thread.join(10.0)
+    assert not thread.is_alive()
