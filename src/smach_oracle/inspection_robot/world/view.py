@@ -66,7 +66,9 @@ def view(
     if light is not None:
         bright += _glare(pose, light)
     bright = _blurred(bright, twist, float(walls[WIDTH // 2]))
-    return np.clip(bright + rng.normal(0.0, NOISE, bright.shape), 0, 255).astype(np.uint8)
+    noisy = rng.normal(0.0, NOISE, bright.shape)
+    noisy += bright
+    return np.clip(noisy, 0, 255, out=noisy).astype(np.uint8)
 
 
 def _distance(pose: Pose, place: Sequence[float]) -> float:
@@ -112,15 +114,21 @@ def _hang(
         ],
         np.float32,
     )
+    before_walls = walls > min(left[0], right[0]) - 0.3
+    size = (WIDTH, HEIGHT)
+    if (corners.max(0) < -1).any() or (corners.min(0) > np.add(size, 1)).any():
+        return  # beside the image
+    if not before_walls.any():
+        return
     side = front.shape[0]
     texture = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
     # where the panel is small, its picture is averaged first, or lines would break into dots
     shrink = max(1.0, side / max(4.0, float(np.ptp(corners[:, 1]))))
     soft = cv2.GaussianBlur(front, (0, 0), 0.4 * shrink) if shrink > 1.2 else front
     warp = cv2.getPerspectiveTransform(texture, corners)
-    seen = cv2.warpPerspective(soft, warp, (WIDTH, HEIGHT), flags=cv2.INTER_LINEAR)
-    whole = cv2.warpPerspective(np.full((side, side), 255, np.uint8), warp, (WIDTH, HEIGHT))
-    there = np.greater(whole, 127) & (walls > min(left[0], right[0]) - 0.3)[None, :]
+    seen = cv2.warpPerspective(soft, warp, size, flags=cv2.INTER_LINEAR)
+    whole = cv2.warpPerspective(np.full((side, side), 255, np.uint8), warp, size)
+    there = np.greater(whole, 127) & before_walls[None, :]
     image[there] = seen[there]
 
 
