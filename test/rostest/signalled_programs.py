@@ -1,6 +1,7 @@
 """A program that meets SIGINT or SIGTERM around its first execute: bare, wrapped, under oracle_run.
 
-Shared by the rostest and the benchmark of signals.
+Shared by the rostest and the benchmark of signals. The signals come when all is imported. So the
+programs are forked from interpreters that have done that once.
 """
 
 import glob
@@ -8,21 +9,28 @@ import json
 import os
 import random
 import signal
-import subprocess
-import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack
 from typing import Any, Callable, List, NamedTuple, Optional, Sequence
 
 import rosbag
-from oracle_support import RUNNER, Process
+from oracle_support import RUNNER
+from waiting import wait_for
+from warm_python import ORACLE_RUN, WarmPython
 
-KINDS = ('bare', 'library', 'oracle_run')
+# of programs, and what is imported before beside ROS's libraries
+KINDS = {
+    'bare': ('smach', 'smach_ros'),
+    'library': ('smach', 'smach_ros', 'smach_oracle', 'smach_oracle.ros.attachment'),
+    'oracle_run': ('smach', 'smach_ros', *ORACLE_RUN),
+}
+START_S = 60.0  # it may take until its first execute
 LONGEST_DELAY_S = 1.0  # what the first execute sets up takes less on a machine that is not busy
 HUNG_AFTER_S = 20.0
 TASK = """
-import faulthandler, signal, sys, time, rospy, smach, smach_ros
+import faulthandler, os, signal, sys, time, rospy, smach, smach_ros
 faulthandler.register(signal.SIGUSR1)
 rospy.init_node('task')
 class Work(smach.State):
@@ -48,8 +56,9 @@ SETTINGS = {!r}
 from smach_oracle import OracleContainer
 OracleContainer.wrap(sm, settings=SETTINGS, name='TASK')
 """.format(SETTINGS)
+# the link appears at once with the number of the process in it
 RUN = """
-print('READY', flush=True)
+os.symlink(str(os.getpid()), os.path.join(os.path.dirname(__file__), 'ready'))
 print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
 
@@ -59,7 +68,7 @@ class Ending(NamedTuple):
 
     kind: str
     number: int  # the signal's
-    delay_s: float  # from READY
+    delay_s: float  # from its first execute
     code: Optional[int]  # None where the process hung
     took_s: float
     broken_bags: List[str]  # why each bag that is not whole is not
@@ -69,7 +78,7 @@ class Ending(NamedTuple):
 def signal_many(
     count: int,
     seed: int,
-    kinds: Sequence[str] = KINDS,
+    kinds: Sequence[str] = tuple(KINDS),
     at_once: int = 4,
     told: Callable[[Ending], Any] = lambda ending: None,
 ) -> List[Ending]:
@@ -86,37 +95,38 @@ def signal_many(
         for kind in kinds
     ]
     endings = []
-    with ThreadPoolExecutor(at_once) as pool:
-        for ending in pool.map(lambda case: _signalled(*case), cases):
+    with ExitStack() as opened:
+        pythons = {kind: WarmPython(*KINDS[kind]) for kind in kinds}
+        for python in pythons.values():
+            opened.callback(python.close)
+        pool = opened.enter_context(ThreadPoolExecutor(at_once))
+        for ending in pool.map(lambda case: _signalled(pythons[case[0]], *case), cases):
             endings.append(ending)
             told(ending)
     return endings
 
 
-def _signalled(kind: str, number: int, delay_s: float, node: str) -> Ending:
-    with tempfile.TemporaryDirectory() as folder:
-        bags = os.path.join(folder, 'bags')
-        program = Process(_command(kind, folder, bags) + ['__name:=' + node])
-        try:
-            if not program.says('READY', 60.0):
-                raise RuntimeError('it did not start: ' + program.output())
-            time.sleep(delay_s)  # the instant itself is what is tried
-            begun_s = time.monotonic()
-            program.signal(number)
-            code = _code(program)
-            if code is None:
-                _say_where(program)
-            return Ending(
-                kind,
-                number,
-                delay_s,
-                code,
-                time.monotonic() - begun_s,
-                _broken(bags),
-                program.output(),
-            )
-        finally:
-            program.stop()
+def _signalled(python: WarmPython, kind: str, number: int, delay_s: float, node: str) -> Ending:
+    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(1) as pool:
+        bags, ready = os.path.join(folder, 'bags'), os.path.join(folder, 'ready')
+        command = _command(kind, folder, bags) + ['__name:=' + node]
+        # it is killed here where it hangs
+        program = pool.submit(python.run, command, START_S + LONGEST_DELAY_S + 2 * HUNG_AFTER_S)
+        wait_for(lambda: program.done() or os.path.islink(ready), START_S)
+        if not os.path.islink(ready):
+            raise RuntimeError('it did not start: {}'.format(program.result()))
+        process = int(os.readlink(ready))
+        time.sleep(delay_s)  # the instant itself is what is tried
+        begun_s = time.monotonic()
+        os.kill(process, number)
+        hung = not wait_for(program.done, HUNG_AFTER_S)
+        took_s = time.monotonic() - begun_s
+        if hung:
+            _end(process, program)
+        ended = program.result()
+        code = None if hung else ended.returncode
+        output = ended.stdout + ended.stderr
+        return Ending(kind, number, delay_s, code, took_s, _broken(bags), output)
 
 
 def _command(kind: str, folder: str, bags: str) -> List[str]:
@@ -127,22 +137,16 @@ def _command(kind: str, folder: str, bags: str) -> List[str]:
         settings = os.path.join(folder, 'oracle.yaml')
         with open(settings, 'w') as file:
             json.dump(SETTINGS, file)
-        return [sys.executable, '-c', RUNNER, '--config', settings, '--record', bags, path]
-    return [sys.executable, path, '_record:=' + bags]
+        return ['-c', RUNNER, '--config', settings, '--record', bags, path]
+    return [path, '_record:=' + bags]
 
 
-def _code(program: Process) -> Optional[int]:
-    try:
-        return program.wait(HUNG_AFTER_S)
-    except subprocess.TimeoutExpired:
-        return None
-
-
-def _say_where(program: Process) -> None:
-    """Let a process that hangs print the stacks of its threads."""
-    program.signal(signal.SIGUSR1)
-    program.says('most recent call first', 5.0)
-    time.sleep(0.5)  # the rest of them comes without an end to be known
+def _end(process: int, program: 'Future[Any]') -> None:
+    """Let a process that hangs print the stacks of its threads, and kill it."""
+    os.kill(process, signal.SIGUSR1)
+    time.sleep(0.5)  # they come without an end to be known
+    if not program.done():
+        os.kill(process, signal.SIGKILL)
 
 
 def _broken(folder: str) -> List[str]:
