@@ -1,7 +1,7 @@
 """Trials of the simulated tabletop on a real Dask cluster on loopback, beside the local pool.
 
 Each launch has a master and a world of its own. One of two workers is killed in the middle.
-task_experiment.py runs this, whose whole experiment is what the local pool has made.
+task_experiment.py runs this, whose experiment on the local pool has been killed and gone on with.
 """
 
 import io
