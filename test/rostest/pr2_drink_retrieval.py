@@ -157,10 +157,13 @@ class DrinkRetrievalTest(unittest.TestCase):
 
     def test_4_the_drink_is_truly_in_the_hand_in_the_end(self):
         """A calm trial can fail too, in 1 of 111. Contacts differ in the last digits from one
-        kind of processor to the next, and so do the seeds that fail. So two of three are asked.
+        kind of processor to the next, and so do the seeds that fail. So two of three are asked:
+        the third is tried where one of the others has failed.
         """
         reached = 0
         for seed in PEACEFUL:
+            if reached == 2:
+                break
             self.assertEqual(draw(seed).causes, ())
             self.assertTrue(self.reset(seed=seed).ok)
             machine = drink_retrieval.make_machine()
@@ -168,7 +171,7 @@ class DrinkRetrievalTest(unittest.TestCase):
             if machine.execute() == 'succeeded':
                 self.assert_true_success()
                 reached += 1
-        self.assertGreaterEqual(reached, 2)
+        self.assertEqual(reached, 2)
 
     def test_5_with_the_oracle_a_drink_that_was_moved_is_picked_where_it_is(self):
         with tempfile.TemporaryDirectory() as folder:
