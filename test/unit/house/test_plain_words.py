@@ -1,22 +1,28 @@
 """Texts for people keep the rules of doc/inside/style.md, and the rules find what they are for."""
 
+import inspect
+import subprocess
+import sys
+from collections import Counter
+
+import plain_words
 import pytest
-from house import ROOT, shown
+from few_phrases import may_have, with_few_forms, with_few_phrases
+from house import ROOT
 from plain_words import (
-    PAGES,
+    INTERFACES,
     STYLE,
     TERMS,
     Prose,
     checked_files,
     faults,
-    faults_of,
     interface_prose,
     page_prose,
     python_prose,
 )
+from proselint import tools
 
 LONG = ' '.join(['The machine goes on'] + ['and on'] * 16) + '.'
-CHECKED_PAGES = [path for path in checked_files() if path.suffix in PAGES]
 # words that made a reader stop, with the rule that sees them
 STOPPED = [
     ('A program that is no ROS node has nobody to ask, and does so at once.', 'term'),
@@ -78,12 +84,55 @@ def test_code_is_read_by_docstrings_comments_and_longer_strings():
     assert comments == ['first second', 'third']
 
 
-@pytest.mark.parametrize('path', CHECKED_PAGES, ids=shown)
-def test_a_page_keeps_the_rules(path):
-    assert not faults_of(path)
+# a fault of each kind of file, in what the rules read of it
+FAULTY = [
+    ('page.md', 'A lease runs out; the next front end takes it.\n', 'semicolon'),
+    ('page.rst', 'Each goes over those above it.\n', 'term'),
+    ('page.md', 'It is very unique.\n', 'uncomparables.misc'),
+    ('code.py', '# The cookie is none any more\n', 'term'),
+    ('code.py', '# Each GOES OVER those above\n', 'term'),
+    ('code.py', 'TEXT = "each goes " \\\n    "over those above"\n', 'term'),
+    ('Each.msg', '# each goes over those\n# above it\nint32 a\n', 'term'),
+]
 
 
-def test_the_texts_in_the_code_keep_the_rules():
-    found = {shown(path): faults_of(path) for path in checked_files() if path.suffix not in PAGES}
-    assert len(found) > 300
-    assert not {name: each for name, each in found.items() if each}
+def test_the_check_fails_by_a_fault_in_each_kind_of_file(tmp_path):
+    """`scripts/test lint words` looks at all files; these tests do not once more."""
+    paths = [tmp_path / str(number) / each[0] for number, each in enumerate(FAULTY)]
+    for path, (_, text, _) in zip(paths, FAULTY):
+        path.parent.mkdir()
+        path.write_text(text)
+    done = subprocess.run(
+        [sys.executable, plain_words.__file__, *map(str, paths)],
+        stdout=subprocess.PIPE,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 1
+    for path, (_, _, rule) in zip(paths, FAULTY):
+        assert '{}:1: {}'.format(path, rule) in done.stdout.decode()
+
+
+def test_the_check_looks_at_pages_code_and_interfaces():
+    counted = Counter(path.suffix for path in checked_files())
+    assert counted['.md'] > 50 and counted['.rst'] and counted['.py'] > 1500
+    assert all(counted[suffix] > 3 for suffix in INTERFACES)
+
+
+@pytest.mark.parametrize('phrase', ['Irregardless', 'proven ſtrategies', 'the \u212aing of'])
+def test_letters_that_count_as_ascii_are_taken_for_it(phrase):
+    assert may_have(phrase, phrase.replace('ſ', 's').replace('\u212a', 'k').lower())
+
+
+def test_with_few_phrases_proselint_finds_what_it_finds_with_all():
+    text = ' At the end of the day, it is Irregardless of a free gift; cafe, ATM machine. '
+    phrases = ['at the end of the day', 'cafe[s]?', 'free gift', 'not there', 'irregardless']
+    forms = [['café', ['cafe', 'caffe']], ['ATM', ['ATM machine']], ['regardless', ['irregardl']]]
+    for check, few, wanted in (
+        (tools.existence_check, with_few_phrases, phrases),
+        (tools.preferred_forms_check, with_few_forms, forms),
+    ):
+        check = inspect.unwrap(check)
+        found = check(text, wanted, 'rule', 'not {}')
+        assert len(found) > 1 and few(check)(text, wanted, 'rule', 'not {}') == found
+        assert few(check)(text, [], 'rule', 'not {}') == []
