@@ -20,6 +20,13 @@ LIMIT_S = 20.0  # for the whole of a delivery
 STEP_LIMIT_S = 10.0  # to connect, and for each word of a mail server
 MOST_ANSWER = 65536  # bytes of an answer
 _AGAIN = (408, 425, 429)  # HTTP: later it may be taken
+# it depends on the moment which of them comes
+_CLOSED = (
+    tornado.simple_httpclient.HTTPStreamClosedError,
+    BrokenPipeError,
+    ConnectionAbortedError,
+    ConnectionResetError,
+)
 
 
 class NotDelivered(Exception):
@@ -54,7 +61,7 @@ def _refusal(err: Exception) -> NotDelivered:
         return _refusal_of_mail(err)
     if isinstance(err, tornado.simple_httpclient.HTTPTimeoutError):
         return NotDelivered('it does not answer in time')
-    if isinstance(err, (tornado.simple_httpclient.HTTPStreamClosedError, ConnectionResetError)):
+    if isinstance(err, _CLOSED):
         return NotDelivered('it closed the connection')
     if isinstance(err, tornado.httpclient.HTTPClientError):
         final = 300 <= err.code < 500 and err.code not in _AGAIN

@@ -3,6 +3,7 @@
 import base64
 import email
 import email.policy
+import errno
 import logging
 import math
 import socket
@@ -14,6 +15,7 @@ import rospy
 from expert_fixtures import make_question
 from receiving import PASSWORD
 
+from smach_oracle.expert.console.reach import delivery
 from smach_oracle.expert.console.reach.calls_text import called_question
 from smach_oracle.expert.console.reach.delivery import NotDelivered, deliver
 from smach_oracle.expert.console.reach.on_call import MailServer, OnCallList, Receiver
@@ -147,6 +149,15 @@ def test_a_webhook_that_is_rude_takes_a_limited_time(serve, impatient, manner, s
     said, final = refusal(post, 'http://127.0.0.1:{}/{}'.format(server.port, PASSWORD))
     assert (said, final) == (says, False)
     assert time.monotonic() - begun_s < 8.0
+
+
+@pytest.mark.parametrize('number', [errno.EPIPE, errno.ECONNRESET, errno.ECONNABORTED])
+def test_a_connection_that_ends_is_told_alike_at_each_moment(monkeypatch, number):
+    def posts(*_):
+        raise OSError(number, 'the moment decides')
+
+    monkeypatch.setattr(delivery, '_post', posts)
+    assert refusal(post, 'http://127.0.0.1:1/') == ('it closed the connection', False)
 
 
 def free_port():
