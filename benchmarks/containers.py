@@ -90,18 +90,19 @@ def branches() -> smach.StateMachine:
     return machine
 
 
-# wanted: 2.5, and 1.15 for a Concurrence. The limits are a fifth to a third above what is reached
-# on a busy machine: 2.9, 2.5, 2.9 and 1.2. Another processor may have another ratio
+# wanted: 2.5, and 1.15 for a Concurrence. Reached are 2.9, 2.5, 2.9 and 1.2 on a busy machine. An
+# earlier version took up to 3.5 for an item of a machine and 4.5 for a small one. The limits are a
+# sixth to a half above what is reached: another processor may have another ratio
 ROWS = (
     Row('item of a plain state', lambda: items_of(Fixed('ok')), ITEMS, 3.4),
-    Row('item of a machine', lambda: items_of(small()), ITEMS, 3.3),
+    Row('item of a machine', lambda: items_of(small()), ITEMS, 3.7),
     Row(
         'small machine',
         lambda: chain(**{'S{}'.format(number): small() for number in range(NESTED)}),
         NESTED,
-        3.8,
+        4.2,
     ),
-    Row('Concurrence of five', branches, REPEATS, 1.45),
+    Row('Concurrence of five', branches, REPEATS, 1.5),
 )
 
 

@@ -2,8 +2,8 @@
 
 rospy closes the socket of the node's XML-RPC server while a thread still listens on it. That thread
 finds the socket ready again and again, and nothing to take from it, until the process is gone. A
-node that a signal ended computed for 0.27 s so, and one whose state went on after that all the
-time.
+node that a signal ended used 0.27 s of processor time this way. One whose state went on used a core
+until the state returned.
 """
 
 import errno

@@ -4,8 +4,8 @@ Rostests wait most of their time: for nodes that start, for time to pass, for ma
 back. All others compute, and some of them wait as well: for processes that they kill, for the disk.
 Three that wait run beside three that compute. Tests and linters that compute give way
 (`processes.NICE`): a rostest then finds the machine almost idle. Hardly ever is a core idle. With
-two that compute, a fifth of both cores was. Benchmarks of wall-clock time run alone, at the
-end.
+two that compute, a fifth of both cores was. Benchmarks whose figure depends on other load run
+alone, at the end.
 """
 
 import sys

@@ -157,8 +157,8 @@ class DrinkRetrievalTest(unittest.TestCase):
 
     def test_4_the_drink_is_truly_in_the_hand_in_the_end(self):
         """A calm trial can fail too, in 1 of 111. Contacts differ in the last digits from one
-        kind of processor to the next, and so do the seeds that fail. So two of three are asked:
-        the third is tried where one of the others has failed.
+        kind of processor to the next, and so do the seeds that fail. So two of three are asked.
+        The third is tried only where one of the others has failed.
         """
         reached = 0
         for seed in PEACEFUL:

@@ -1,7 +1,7 @@
 """A program that meets SIGINT or SIGTERM around its first execute: bare, wrapped, under oracle_run.
 
-Shared by the rostest and the benchmark of signals. The signals come when all is imported. So the
-programs are forked from interpreters that have done that once.
+Shared by the rostest and the benchmark of signals. The signals come from the first execute on. What
+a program has imported by then is imported once: the programs are forked from such interpreters.
 """
 
 import glob
@@ -12,7 +12,7 @@ import signal
 import tempfile
 import time
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from typing import Any, Callable, List, NamedTuple, Optional, Sequence
 
 import rosbag
@@ -23,7 +23,7 @@ from warm_python import ORACLE_RUN, WarmPython
 # of programs, and what is imported before beside ROS's libraries
 KINDS = {
     'bare': ('smach', 'smach_ros'),
-    'library': ('smach', 'smach_ros', 'smach_oracle', 'smach_oracle.ros.attachment'),
+    'library': ('smach', 'smach_ros', 'smach_oracle', 'smach_oracle.ros.container'),
     'oracle_run': ('smach', 'smach_ros', *ORACLE_RUN),
 }
 START_S = 60.0  # it may take until its first execute
@@ -118,7 +118,8 @@ def _signalled(python: WarmPython, kind: str, number: int, delay_s: float, node:
         process = int(os.readlink(ready))
         time.sleep(delay_s)  # the instant itself is what is tried
         begun_s = time.monotonic()
-        os.kill(process, number)
+        with suppress(ProcessLookupError):  # it has ended by itself
+            os.kill(process, number)
         hung = not wait_for(program.done, HUNG_AFTER_S)
         took_s = time.monotonic() - begun_s
         if hung:
@@ -143,9 +144,9 @@ def _command(kind: str, folder: str, bags: str) -> List[str]:
 
 def _end(process: int, program: 'Future[Any]') -> None:
     """Let a process that hangs print the stacks of its threads, and kill it."""
-    os.kill(process, signal.SIGUSR1)
-    time.sleep(0.5)  # they come without an end to be known
-    if not program.done():
+    with suppress(ProcessLookupError):
+        os.kill(process, signal.SIGUSR1)
+        time.sleep(0.5)  # they come without an end to be known
         os.kill(process, signal.SIGKILL)
 
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Whole experiments with run_trials, which starts masters of its own: to the end, stopped, killed,
-gone on with, and on a cluster.
+"""Experiments with run_trials, which starts masters of its own: stopped, killed and gone on with to
+the end, and on a cluster.
 """
 
 import os
@@ -65,8 +65,8 @@ class Experiment(TrialsOnACluster):
     def setUpClass(cls) -> None:
         """Kill an experiment in the middle, and have it go on to its end.
 
-        That on the cluster is compared with it, where each trial runs whose job has not been
-        interrupted after a first trial.
+        The run on the cluster is compared with it. There, the second trial of a job follows the
+        first in the same process, unless its worker was killed.
         """
         folder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(folder.cleanup)
@@ -100,7 +100,7 @@ class Experiment(TrialsOnACluster):
         self.assertIn('trials: there 2, now 9', refused.communicate(timeout=60)[0])
         self.assertEqual(refused.returncode, 1)
 
-    def test_a_cluster_has_the_same_although_a_worker_and_here_the_whole_was_killed(self) -> None:
+    def test_a_killed_worker_and_a_killed_run_give_the_same_rows(self) -> None:
         self.check_rows_although_a_worker_is_killed(self.gone_on, self.output, start)
 
     def test_ctrl_c_pressed_twice_stops_everything_even_a_frozen_node_and_keeps_the_bags(

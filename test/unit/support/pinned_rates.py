@@ -22,7 +22,7 @@ if __name__ == '__main__':
 
 from pinned import FOLDER
 from pinned_settings import digest_of
-from pinned_trees import Told, logged, plan_of
+from pinned_trees import Told, logged, plan_of, rounded
 from tree_model.drawing import Shape
 
 from smach_oracle.oracle.machine.nesting import records_of
@@ -59,7 +59,7 @@ WORDS_OF_PYTHON = re.compile(r'(cannot be (?:used|read as results of ways): )(?!
 def tell() -> Dict[str, List[str]]:
     """Return, for each part of each file, a line for each value in its place."""
     with tempfile.TemporaryDirectory() as folder, mock.patch.object(os, 'fsync'):
-        path = str(Path(folder, 'rates.json'))
+        path = os.path.realpath(os.path.join(folder, 'rates.json'))
         return {
             '{} {}'.format(number, '/'.join(map(str, place))): _told(machine, path, content, place)
             for number in TREES
@@ -98,8 +98,7 @@ def _told(machine: Told, path: str, content: Any, place: Place) -> List[str]:
         _read(machine, path)
         shown = 'GONE' if value is GONE else repr(value)
         lines += [
-            '{}: {}'.format(shown, WORDS_OF_PYTHON.sub(r'\1"', line.replace(path, 'FILE')))
-            for line in machine.lines
+            '{}: {}'.format(shown, WORDS_OF_PYTHON.sub(r'\1"', line)) for line in machine.lines
         ]
     return lines
 
@@ -108,13 +107,13 @@ def _read(machine: Told, path: str) -> None:
     """Have a machine read its rates file and write it, and tell what is known then."""
     node = marked_node(machine.machine)
     node.tree.rates_loaded = ''
-    with logged(machine.tell):
+    with logged(lambda what, text: machine.tell(what, text.replace(path, 'FILE'))):
         load_rates(node)
         machine.tell('RATES', machine.machine.rates())
         for record in records_of(node):
             machine.tell('WAYS ' + record.label, record.ways_so_far())
         save_rates(node)
-    machine.lines.append('FILE {}'.format(Path(path).read_text()))
+    machine.lines.append('FILE {}'.format(rounded(Path(path).read_text())))
 
 
 def _changed(content: Any, place: Place, value: Any) -> Any:

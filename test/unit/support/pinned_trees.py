@@ -320,11 +320,12 @@ def _written(value: Any) -> str:
     text = '' if text == '{}' else KEY.sub(r'\1: ', text)
     for pattern, name in ((SECONDS, '# s'), (ADDRESS, ''), (ID, '#')):
         text = pattern.sub(name, text)
-    return NUMBER.sub(_rounded, text)
+    return rounded(text)
 
 
-def _rounded(found: Any) -> str:
-    return '{:.3f}'.format(float(found.group()))
+def rounded(text: str) -> str:
+    """A text with three digits of each number behind its point."""
+    return NUMBER.sub(lambda found: '{:.3f}'.format(float(found.group())), text)
 
 
 def _is_told(key: str) -> bool:

@@ -223,9 +223,15 @@ class ExponentialFailureRate(_Totals):
 
 def _totals(learned: Learned) -> Tuple[int, int]:
     totals = (learned.get('successes', 0), learned.get('failures', 0))
-    if not all(is_whole(total, 0) for total in totals):
+    successes, failures = map(_whole, totals)
+    if not (is_whole(successes, 0) and is_whole(failures, 0)):
         raise ValueError('successes, failures: {!r} are not counts'.format(totals))
-    return totals
+    return successes, failures
+
+
+def _whole(total: Any) -> Any:
+    """Return an int for a whole float, which a program that rewrites a JSON file may make of it."""
+    return int(total) if isinstance(total, float) and total.is_integer() else total
 
 
 def _window(learned: Learned) -> List[int]:

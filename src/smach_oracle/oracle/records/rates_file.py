@@ -124,7 +124,7 @@ def _merge(
             if label in states:
                 try:
                     written = record.merged_with(states[label])
-                except ValueError as err:
+                except (ArithmeticError, TypeError, ValueError) as err:
                     _tell_unusable(path, label, learner, err)
             done.append(partial(record.share, before, written))
             states[label] = written

@@ -12,6 +12,7 @@ from functools import lru_cache
 from typing import Any, Callable, Deque, Dict, Iterable, List, Mapping, Optional, Tuple
 
 from ..decision.ways import PLACES, Count, WayResult
+from ..number_checks import is_whole
 from .events import FailureKind
 from .short_text import shortened
 
@@ -208,7 +209,8 @@ def merged_ways(
     if told and not is_new and all(theirs.get(key) == each for key, each in told.items()):
         return told  # as of most states, if one has failed: there is nothing to read
     (ours, total), (others, other_total) = results_in(own), results_in(theirs)
-    new = max(0, total - int(base.get(WAYS_TOTAL, 0)))
+    before = base.get(WAYS_TOTAL, 0)  # a file that had no results may have had anything here
+    new = max(0, total - (before if is_whole(before, 0) else 0))
     results = deque([*others, *ours[len(ours) - min(new, len(ours)) :]], MOST_RESULTS)
     return told_of(results, other_total + new) if results else {}
 

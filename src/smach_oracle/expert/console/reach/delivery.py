@@ -20,12 +20,14 @@ LIMIT_S = 20.0  # for the whole of a delivery
 STEP_LIMIT_S = 10.0  # to connect, and for each word of a mail server
 MOST_ANSWER = 65536  # bytes of an answer
 _AGAIN = (408, 425, 429)  # HTTP: later it may be taken
-# it depends on the moment which of them comes
+# which one is raised depends on when the receiver closes
 _CLOSED = (
     tornado.simple_httpclient.HTTPStreamClosedError,
     BrokenPipeError,
     ConnectionAbortedError,
     ConnectionResetError,
+    ssl.SSLEOFError,
+    ssl.SSLZeroReturnError,
 )
 
 
@@ -74,7 +76,7 @@ def _refusal(err: Exception) -> NotDelivered:
         return NotDelivered('its name is not found')
     if isinstance(err, ConnectionRefusedError):
         return NotDelivered('it refuses the connection')
-    if isinstance(err, OSError) and err.errno:
+    if isinstance(err, OSError) and err.errno and not isinstance(err, ssl.SSLError):
         name = errno.errorcode.get(err.errno, err.errno)
         return NotDelivered('the connection failed ({})'.format(name))
     return NotDelivered('it cannot be talked to ({})'.format(type(err).__name__))

@@ -7,6 +7,7 @@ import errno
 import logging
 import math
 import socket
+import ssl
 import time
 
 import pytest
@@ -151,10 +152,19 @@ def test_a_webhook_that_is_rude_takes_a_limited_time(serve, impatient, manner, s
     assert time.monotonic() - begun_s < 8.0
 
 
-@pytest.mark.parametrize('number', [errno.EPIPE, errno.ECONNRESET, errno.ECONNABORTED])
-def test_a_connection_that_ends_is_told_alike_at_each_moment(monkeypatch, number):
+@pytest.mark.parametrize(
+    'error',
+    [
+        OSError(errno.EPIPE, 'while it is sent'),
+        OSError(errno.ECONNRESET, 'while it is read'),
+        OSError(errno.ECONNABORTED, 'as it is made'),
+        ssl.SSLEOFError(ssl.SSL_ERROR_EOF, 'in the handshake'),
+        ssl.SSLZeroReturnError(ssl.SSL_ERROR_ZERO_RETURN, 'behind it'),
+    ],
+)
+def test_a_connection_that_ends_is_told_alike_at_each_moment(monkeypatch, error):
     def posts(*_):
-        raise OSError(number, 'the moment decides')
+        raise error
 
     monkeypatch.setattr(delivery, '_post', posts)
     assert refusal(post, 'http://127.0.0.1:1/') == ('it closed the connection', False)
