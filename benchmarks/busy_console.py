@@ -336,8 +336,8 @@ def main():
         default=os.cpu_count(),
         help='processes that never rest (default: %(default)s)',
     )
-    parser.add_argument('--marks', type=int, default=30, help='default: %(default)s')
-    parser.add_argument('--stops', type=int, default=15, help='of each kind (default: %(default)s)')
+    parser.add_argument('--marks', type=int, default=20, help='default: %(default)s')
+    parser.add_argument('--stops', type=int, default=10, help='of each kind (default: %(default)s)')
     parser.add_argument('--nice', help='of the interfaces (default: their own)')
     parser.add_argument('--check', action='store_true', help='fail outside of the limits')
     options = parser.parse_args()

@@ -115,9 +115,9 @@ def main():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument(
-        '--seconds', type=float, default=5.0, help='to drive for the rate (default: %(default)s)'
+        '--seconds', type=float, default=3.0, help='to drive for the rate (default: %(default)s)'
     )
-    parser.add_argument('--stops', type=int, default=7, help='of each kind (default: %(default)s)')
+    parser.add_argument('--stops', type=int, default=5, help='of each kind (default: %(default)s)')
     parser.add_argument('--check', action='store_true', help='fail outside of the limits')
     options = parser.parse_args()
     from own_master import wait_for_master
