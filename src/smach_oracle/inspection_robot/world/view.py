@@ -115,12 +115,12 @@ def _hang(
         np.float32,
     )
     before_walls = walls > min(left[0], right[0]) - 0.3
-    size = (WIDTH, HEIGHT)
-    if (corners.max(0) < -1).any() or (corners.min(0) > np.add(size, 1)).any():
+    size, side = (WIDTH, HEIGHT), front.shape[0]
+    texel = 1 + float(np.ptp(corners, axis=0).max()) / side  # it reaches beyond its corner
+    if (corners.max(0) < -texel).any() or (corners.min(0) > np.add(size, texel)).any():
         return  # beside the image
     if not before_walls.any():
         return
-    side = front.shape[0]
     texture = np.array([(0, 0), (side, 0), (side, side), (0, side)], np.float32)
     # where the panel is small, its picture is averaged first, or lines would break into dots
     shrink = max(1.0, side / max(4.0, float(np.ptp(corners[:, 1]))))
