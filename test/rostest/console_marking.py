@@ -107,6 +107,9 @@ class Marking(ConsolePage, unittest.TestCase):
             ).key_up(Keys.SHIFT).perform()
         self.cross = [int(each) for each in point]
 
+    def stamp_of_image(self):
+        return self.browser.run('return document.querySelector(".perception").dataset.stamp')
+
     def assert_a_region_is_marked_by_keys(self):
         browser, marked = self.browser, len(self.told('mark'))
         first, last = self.around_the_can()
@@ -118,6 +121,10 @@ class Marking(ConsolePage, unittest.TestCase):
         self.assertIn('It begins at {}, {} of 640 by 480'.format(*self.cross), browser.run(told))
         ActionChains(browser.driver, duration=0).send_keys(Keys.ESCAPE).perform()
         self.assertTrue(browser.find('.perception'), 'the line is taken back, not the question')
+        ActionChains(browser.driver, duration=0).send_keys(Keys.ESCAPE).perform()
+        self.assertTrue(browser.find('.perception'), 'the cross, too')
+        self.cross = [320, 240]
+        self.cross_to(first)
         ActionChains(browser.driver, duration=0).send_keys(' ').perform()
         self.cross_to(last)
         ActionChains(browser.driver, duration=0).send_keys(Keys.ENTER).perform()
@@ -160,6 +167,7 @@ class Marking(ConsolePage, unittest.TestCase):
         self.drag(left_top, (right_bottom[0], left_top[1]))
         self.assertTrue(wait_for(lambda: len(self.told('mark')) == 2), 'a stroke cuts again')
         self.assertEqual([told.ok for told in self.told('mark')], [True, True])
+        type(self).stamp = self.stamp_of_image()
         browser.click('.perception .accept')
         self.assertTrue(wait_for(lambda: rospy.has_param('/alpha/picked')))
         self.assertLess(
@@ -183,6 +191,8 @@ class Marking(ConsolePage, unittest.TestCase):
         browser.click(QUESTION)
         browser.click('.choice.interface[data-name=perception]')
         browser.find('.perception.shown', 30.0)
+        # at first the last image of before may be there, and a new one drops what was drawn on it
+        self.assertTrue(wait_for(lambda: self.stamp_of_image() != self.stamp))
         self.assert_a_region_is_marked_by_keys()
         browser.click('.perception .quit')
         self.assertTrue(browser.says('It asks again', '.follow-up', 30.0))

@@ -28,12 +28,13 @@ export class MarkingKeys {
   key(event) {
     const step = STEPS[event.key];
     const sets = event.key === 'Enter' || event.key === ' ';
-    const takesBack = event.key === 'Escape' && this.canvas.marking.line;
+    // also where a new image has just dropped the line: Escape would leave the question then
+    const takesBack = event.key === 'Escape' && (this.cross || this.canvas.marking.line);
     if (modified(event) || !(step || sets || takesBack) || !this.canvas.panel.mayDraw) return;
     event.preventDefault();
     event.stopPropagation(); // these keys mean something else elsewhere on the page
     if (step) this.step(step, event.shiftKey);
-    else if (takesBack) this.canvas.cancel();
+    else if (takesBack) this.takeBack();
     else if (!event.repeat) this.set();
   }
 
@@ -66,6 +67,12 @@ export class MarkingKeys {
     else this.canvas.begin(this.cross);
     this.canvas.paint();
     announce((this.canvas.marking.line ? 'It begins at ' : 'It ends at ') + this.words());
+  }
+
+  /** Take the line back, or the cross where there is no line. */
+  takeBack() {
+    if (this.canvas.marking.line) this.canvas.cancel();
+    else this.hide();
   }
 
   words() {

@@ -150,6 +150,7 @@ export class PerceptionPanel {
       this.forget();
     }
     this.stamp = stamp;
+    this.root.dataset['stamp'] = stamp;
     this.root.classList.add('shown');
     this.draw();
   }
