@@ -95,9 +95,10 @@ class Scripted(smach.State):
         for key in plan.writes:
             ud[key] = '{}/{}#{}'.format(self._path, plan.label, number)
         action = world.plan.action(self._path, plan, number)
+        self._await_preempt()  # before its own, which would be taken for one that is on its way
         if action.kind == 'preempt' and world.takes_preempt():
             world.top.request_preempt()
-        self._await_preempt()
+            self._await_preempt()
         if self.preempt_requested():
             self.service_preempt()
             return action.outcome if action.kind == 'preempt' else 'preempted'

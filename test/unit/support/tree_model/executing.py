@@ -136,11 +136,16 @@ class _InTurn(OracleState):
         return super().execute(ud)
 
     def _await_preempt(self, recovery: Any) -> None:
-        """Where a Concurrence around is about to stop its branches, wait for that."""
-        if owed_branches(self._node.machine._states[recovery.failure.state]):
-            end = time.monotonic() + self._world.patience_s
-            while not recovery.stopped() and time.monotonic() < end:
-                time.sleep(0.001)  # it comes in the thread of a branch beside
+        """Where Concurrences around are about to stop their branches, wait for all of them.
+
+        Whoever takes a turn later does not wait for those again.
+        """
+        branches = owed_branches(self._node.machine._states[recovery.failure.state])
+        end = time.monotonic() + self._world.patience_s
+        while branches and time.monotonic() < end:
+            if recovery.stopped() and all(each.preempt_requested() for each in branches):
+                return
+            time.sleep(0.001)  # it comes in the thread of a branch beside
 
 
 def _userdata() -> smach.UserData:
