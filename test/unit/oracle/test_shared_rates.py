@@ -217,6 +217,19 @@ def test_what_another_program_has_written_and_nobody_can_read_is_replaced(
     assert (again.rate('A').successes, again.rate('A').failures) == (3, 1)
 
 
+def test_counts_that_another_program_has_made_floats_are_counts(tmp_path):
+    path = tmp_path / 'rates.json'
+    machine(path, 'PICK', ['aborted', 'ok']).run()
+    content = json.loads(path.read_text())
+    counts = content['machines']['PICK']['']['A']
+    counts.update(successes=1.0, failures=1.0)
+    path.write_text(json.dumps(content))
+    one, two = (machine(path, 'PICK', ['aborted']) for _ in range(2))
+    for each in (one, two, one):
+        each.run()
+    assert learned(path, 'PICK') == (4, 3)
+
+
 HAMMER = """
 import sys
 sys.path[:0] = {path!r}

@@ -291,8 +291,8 @@ def merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapsho
 
 
 def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapshot:
-    successes = own['successes'] - base.get('successes', 0)
-    failures = own['failures'] - base.get('failures', 0)
+    shared_successes, shared_failures = _totals(base)
+    successes, failures = own['successes'] - shared_successes, own['failures'] - shared_failures
     if base and base == base_of(theirs):
         return dict(own)
     their_successes, their_failures = _totals(theirs)
