@@ -6,7 +6,7 @@ writes all again (test/data/pinned/README.md).
 
 import pinned_rates
 import pytest
-from pinned import held
+from pinned import digests_of, held
 
 
 @pytest.fixture(scope='module')
@@ -15,8 +15,7 @@ def told():
 
 
 def test_rates_files_are_taken_over_refused_and_written_as_they_were(told):
-    found = ['{}: {}'.format(name, pinned_rates.digest_of(told[name])) for name in told]
-    assert found == held('rates')
+    assert digests_of(told) == held('rates')
 
 
 def test_they_are_told_in_full(told):

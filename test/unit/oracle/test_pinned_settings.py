@@ -6,7 +6,7 @@ writes all again (test/data/pinned/README.md).
 
 import pinned_settings
 import pytest
-from pinned import held
+from pinned import digests_of, held
 
 
 @pytest.fixture(scope='module')
@@ -15,8 +15,7 @@ def told():
 
 
 def test_settings_are_taken_and_refused_as_they_were(told):
-    found = ['{}: {}'.format(name, pinned_settings.digest_of(told[name])) for name in told]
-    assert found == held('settings')
+    assert digests_of(told) == held('settings')
 
 
 def test_they_are_told_in_full(told):

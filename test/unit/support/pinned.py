@@ -1,5 +1,6 @@
 """Events as lines of text, and the files that hold those of test/data/pinned."""
 
+import hashlib
 import json
 import re
 from pathlib import Path
@@ -16,6 +17,27 @@ NOT_HELD = ('settings', 'failure_rule', 'origin', 'inputs')
 def held(name):
     """The lines of a file."""
     return (FOLDER / (name + '.txt')).read_text('utf-8').splitlines()
+
+
+def digest_of(lines):
+    """The digest of some lines."""
+    return hashlib.sha256('\n'.join(lines).encode()).hexdigest()[:10]
+
+
+def digests_of(told):
+    """A line for each of `told`, lists of lines by name: the name, and the digest of its lines."""
+    return ['{}: {}'.format(name, digest_of(lines)) for name, lines in told.items()]
+
+
+def write_told(what, told, folder, pins):
+    """Write all lines to a file of that name in a folder. `pins`: their digests here, too."""
+    folder.mkdir(exist_ok=True)
+    for place, lines in (
+        (folder, ['\n    '.join([name, *told[name]]) for name in told]),
+        (FOLDER, digests_of(told) if pins else []),
+    ):
+        if lines:
+            (place / (what + '.txt')).write_text(''.join(line + '\n' for line in lines), 'utf-8')
 
 
 def told(events, concurrence=''):

@@ -20,8 +20,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import FOLDER
-from pinned_settings import digest_of
+from pinned import write_told
 from pinned_trees import Told, logged, plan_of, rounded
 from tree_model.drawing import Shape
 
@@ -131,18 +130,5 @@ def _changed(content: Any, place: Place, value: Any) -> Any:
     return changed
 
 
-def write(folder: Path, pins: bool) -> None:
-    """Write all lines. `pins`: the digests, too."""
-    folder.mkdir(exist_ok=True)
-    told = tell()
-    (folder / 'rates.txt').write_text(
-        ''.join('{}\n    {}\n'.format(name, '\n    '.join(told[name])) for name in told), 'utf-8'
-    )
-    if pins:
-        (FOLDER / 'rates.txt').write_text(
-            ''.join('{}: {}\n'.format(name, digest_of(told[name])) for name in told), 'utf-8'
-        )
-
-
 if __name__ == '__main__':
-    write(Path(sys.argv[1]), '--pin' in sys.argv)
+    write_told('rates', tell(), Path(sys.argv[1]), '--pin' in sys.argv)

@@ -6,7 +6,6 @@ writes that to FOLDER, and with --pin the digests to test/data/pinned/settings.t
 of a change is the difference of two folders, of before and after it.
 """
 
-import hashlib
 import os
 import re
 import sys
@@ -18,7 +17,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import ADDRESS, FOLDER
+from pinned import ADDRESS, write_told
 
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.checks import settings_of
@@ -223,26 +222,5 @@ def _plain(text: str) -> str:
     return re.sub(r'\{1, 2\}|\{2, 1\}', 'a set', ADDRESS.sub('', text)).replace('__main__', FILE)
 
 
-def digest_of(lines: List[str]) -> str:
-    """The digest of some lines."""
-    return hashlib.sha256('\n'.join(lines).encode()).hexdigest()[:10]
-
-
-def write(folder: Path, pins: bool) -> None:
-    """Write all lines. `pins`: the digests, too."""
-    folder.mkdir(exist_ok=True)
-    told = tell()
-    (folder / 'settings.txt').write_text(
-        ''.join(
-            '{}\n{}\n'.format(name, '\n'.join('    ' + line for line in lines))
-            for name, lines in told.items()
-        ),
-        'utf-8',
-    )
-    if pins:
-        digests = ['{}: {}\n'.format(name, digest_of(lines)) for name, lines in told.items()]
-        (FOLDER / 'settings.txt').write_text(''.join(digests), 'utf-8')
-
-
 if __name__ == '__main__':
-    write(Path(sys.argv[1]), '--pin' in sys.argv)
+    write_told('settings', tell(), Path(sys.argv[1]), '--pin' in sys.argv)

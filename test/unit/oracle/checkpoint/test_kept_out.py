@@ -91,21 +91,8 @@ def test_what_was_not_stored_is_missing_or_as_the_script_gives_it(tmp_path):
 
 def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     def iterated(items):
-        iterator = smach.Iterator(
-            ['succeeded', 'aborted'],
-            ['done'],
-            ['done'],
-            it=items,
-            it_label='item',
-            exhausted_outcome='succeeded',
-        )
-        with iterator:
-            smach.Iterator.set_contained_state(
-                'I',
-                Noted('I', Diary(str(tmp_path / 'diary')), lambda: None, keys=('done', 'item')),
-                loop_outcomes=['succeeded'],
-            )
-        return iterator
+        diary = Diary(str(tmp_path / 'diary'))
+        return each_of(items, 'I', Noted('I', diary, lambda: None, keys=('done', 'item')))
 
     machine = smach.StateMachine(['succeeded', 'aborted'])
     machine.userdata.done = []

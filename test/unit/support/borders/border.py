@@ -12,8 +12,8 @@ from hypothesis.internal.reflection import get_pretty_function_description
 from hypothesis.strategies import SearchStrategy
 
 LONGEST_S = 60.0  # of one example: what takes so long hangs
-# Hypothesis describes a strategy at each draw, for an example that fails. That took a tenth of the
-# time
+# Hypothesis describes a strategy at each draw, for an example that fails. That took a quarter of
+# the time
 DESCRIBED = functools.lru_cache(maxsize=10000)(get_pretty_function_description)
 TAKEN, REFUSED = BOTH = 'taken', 'refused'
 
