@@ -24,7 +24,7 @@ from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
 from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .smach_private import Transitions, data_of, opened_container
+from .smach_private import Transitions, data_of, keys_of, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -349,6 +349,7 @@ class OracleContainer(smach.StateMachine):
         lock = self._state_transitioning_lock
         engine, records, history = node.engine, node.records, node.records.history
         states, transitions_of, remappings = self._states, self._transitions, self._remappings
+        constants_of = self._constants.get
         # a machine that runs has a current state, with its label and its transitions
         label: str = self._current_label  # type: ignore[assignment]
         state: smach.State = self._current_state  # type: ignore[assignment]
@@ -362,16 +363,18 @@ class OracleContainer(smach.StateMachine):
                 stop = before_step(node)
                 if stop is not None:
                     return stop.outcome
-            view = record.view
-            snapshot = (
-                None if view is None else view.snapshot(state, self.userdata, remappings[label])
-            )
-            if view is None or snapshot is None:
+            view, userdata = record.view, self.userdata
+            if (
+                view is None
+                or view.state is not state
+                or view.userdata is not userdata
+                or view.remapping is not remappings[label]
+                or view.keys != keys_of(state)
+            ):
                 view = record.view = StateView(self, label, state)
-                snapshot = data_of(view.userdata).copy()
-            record.snapshot = snapshot
+            record.snapshot = data_of(userdata).copy()
             observed = node.events.observers
-            constants = self._constants.get(label)
+            constants = constants_of(label)
             outcome: Any  # a user's state may return anything
             error = None
             if engine.lock_is_held:
@@ -379,7 +382,7 @@ class OracleContainer(smach.StateMachine):
             try:
                 try:
                     if constants:
-                        write_constants(view.userdata, constants)
+                        write_constants(userdata, constants)
                     if record.special or node.abandoned:
                         outcome = execute_watched(node, record, state, view.remapper)
                     elif observed:

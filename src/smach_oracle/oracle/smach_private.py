@@ -2,17 +2,21 @@
 
 Upstream's engine and our own have the same names, which public scripts and tools use too. Where
 they differ, the docstring says so. A class of ours that extends one of SMACH's reads its own by
-`self`. On Python 3.11 a call of one of these costs 15 ns, a seventieth of a wrapped transition.
+`self`. What only reads a name is an `attrgetter`: that costs half of a function of ours, and the
+short way of a plain success calls two.
 """
 
 import threading
+from operator import attrgetter
 from typing import (
     Any,
+    Callable,
     Collection,
     Dict,
     List,
     Mapping,
     MutableMapping,
+    NamedTuple,
     Optional,
     Set,
     Tuple,
@@ -55,67 +59,27 @@ def remove_mark(machine: object) -> None:
 
 # -- the states of a container, and what lies between them
 
-
-def states_of(container: HasStates) -> Dict[str, smach.State]:
-    """Return the states of a StateMachine or a Concurrence by label, in the author's order."""
-    return container._states
-
-
-def transitions_of(machine: smach.StateMachine) -> Dict[str, Transitions]:
-    """Return where each outcome leads, by the label of the state. None leads nowhere."""
-    return machine._transitions
-
-
-def remappings_of(container: HasStates) -> Dict[str, Mapping[str, str]]:
-    """Return the container's names of its states' keys, by the label of the state."""
-    return container._remappings
+# of a StateMachine or a Concurrence: the states by label, in the author's order
+states_of: Callable[[HasStates], Dict[str, smach.State]] = attrgetter('_states')
+# where each outcome leads, by the label of the state. None leads nowhere
+transitions_of: Callable[[smach.StateMachine], Dict[str, Transitions]] = attrgetter('_transitions')
+# the container's names of its states' keys, by the label of the state
+remappings_of: Callable[[HasStates], Dict[str, Mapping[str, str]]] = attrgetter('_remappings')
+# the sets of a state's input and output keys themselves. One that registers a key gets new sets
+keys_of: Callable[[smach.State], Tuple[Set[str], Set[str]]] = attrgetter(
+    '_input_keys', '_output_keys'
+)
+# the values of userdata by key, to read and to write
+data_of: Callable[[smach.UserData], Dict[str, object]] = attrgetter('_data')
+# the transition callbacks of a container, each with its arguments
+transition_callbacks: Callable[[smach.Container], List[Tuple[Any, Any]]] = attrgetter(
+    '_transition_cbs'
+)
 
 
 def constants_of(machine: smach.StateMachine, label: str) -> Mapping[str, object]:
     """Return what is written into the userdata before each visit of a state."""
     return machine._constants.get(label) or {}
-
-
-def keys_of(state: smach.State) -> Tuple[Set[str], Set[str]]:
-    """Return the sets of a state's input and output keys themselves.
-
-    A state that registers a key gets new sets.
-    """
-    return state._input_keys, state._output_keys
-
-
-class KeptParts:
-    """What a state's view of the userdata was made of, to be compared at its next visit."""
-
-    __slots__ = ('state', 'userdata', 'remapping', 'input_keys', 'output_keys')
-    state: Optional[smach.State]  # None: made for one visit
-    userdata: smach.UserData
-    remapping: Mapping[str, str]
-    input_keys: Set[str]
-    output_keys: Set[str]
-
-    def snapshot(
-        self, state: smach.State, userdata: smach.UserData, remapping: Mapping[str, str]
-    ) -> Optional[Dict[str, object]]:
-        """Return the values of the userdata now, None where a part was exchanged.
-
-        The short way of a plain success makes this one call in each step.
-        """
-        if (
-            self.state is state
-            and self.userdata is userdata
-            and self.remapping is remapping
-            and self.input_keys is state._input_keys
-            and self.output_keys is state._output_keys
-        ):
-            return userdata._data.copy()
-        return None
-
-
-def data_of(userdata: smach.UserData) -> Dict[str, object]:
-    """Return the values of userdata by key, to read and to write."""
-    data: Dict[str, object] = userdata._data
-    return data
 
 
 def hold_data(userdata: smach.UserData, data: MutableMapping[str, object]) -> None:
@@ -130,22 +94,15 @@ def opened_container() -> Optional[smach.Container]:
     return container
 
 
-def transition_callbacks(container: smach.Container) -> List[Tuple[Any, Any]]:
-    """Return the transition callbacks of a container, each with its arguments."""
-    return container._transition_cbs
-
-
 # -- a machine that executes. Its thread alone writes
 
-
-def lock_of(machine: smach.StateMachine) -> 'threading.RLock':
-    """Return the lock of a machine, which is free while a state executes."""
-    return machine._state_transitioning_lock
-
-
-def is_executing(machine: smach.StateMachine) -> bool:
-    """Whether it is being executed, whatever its class says of `is_running`."""
-    return machine._is_running
+# the lock of a machine, which is free while a state executes
+lock_of: Callable[[smach.StateMachine], 'threading.RLock'] = attrgetter('_state_transitioning_lock')
+# whether it is being executed, whatever its class says of `is_running`
+is_executing: Callable[[smach.StateMachine], bool] = attrgetter('_is_running')
+current_state_of: Callable[[smach.StateMachine], Optional[smach.State]] = attrgetter(
+    '_current_state'
+)
 
 
 def set_executing(machine: smach.StateMachine, is_running: bool) -> None:
@@ -156,11 +113,6 @@ def set_executing(machine: smach.StateMachine, is_running: bool) -> None:
 def current_label_of(machine: smach.StateMachine) -> str:
     """Return the label of the current state, '' where none is."""
     return machine._current_label or ''
-
-
-def current_state_of(machine: smach.StateMachine) -> Optional[smach.State]:
-    """Return the current state."""
-    return machine._current_state
 
 
 def set_current_label(machine: smach.StateMachine, label: Optional[str]) -> None:
@@ -189,20 +141,17 @@ def state_ended(
 
 # -- its preempt
 
-
-def has_preempt_flag(state: smach.State) -> bool:
-    """Whether it has a request, whatever its class says of `preempt_requested`."""
-    return state._preempt_requested
+# whether it has a request, whatever its class says of `preempt_requested`
+has_preempt_flag: Callable[[smach.State], bool] = attrgetter('_preempt_requested')
+# the state to which a request was passed on last, until it was seen to obey
+preempted_state_of: Callable[[smach.StateMachine], Optional[smach.State]] = attrgetter(
+    '_preempted_state'
+)
 
 
 def set_preempt_flag(machine: smach.StateMachine, is_requested: bool) -> None:
     """Have a request, or none, without passing it on to the current state."""
     machine._preempt_requested = is_requested
-
-
-def preempted_state_of(machine: smach.StateMachine) -> Optional[smach.State]:
-    """Return the state to which a request was passed on last, until it was seen to obey."""
-    return machine._preempted_state
 
 
 def set_preempted_state(
@@ -223,35 +172,19 @@ def note_passed_on(machine: smach.StateMachine) -> None:
 
 # -- Concurrences and Iterators
 
-
-def outcome_map_of(concurrence: Any) -> Mapping[str, Mapping[str, str]]:
-    """Return which outcomes of its states a Concurrence maps to which of its own."""
-    return concurrence._outcome_map
-
-
-def final_outcomes_of(iterator: Any) -> Mapping[str, str]:
-    """Return which outcome of the last item an Iterator maps to which of its own."""
-    return iterator._final_outcome_map
-
-
-def loop_outcomes_of(iterator: Any) -> Collection[str]:
-    """Return the outcomes after which an Iterator goes on. If there are none, all not to break."""
-    return iterator._loop_outcomes
-
-
-def break_outcomes_of(iterator: Any) -> Collection[str]:
-    """Return the outcomes after which an Iterator ends."""
-    return iterator._break_outcomes
-
-
-def items_of(iterator: Any) -> Any:
-    """Return what an Iterator was given to iterate over: an iterable, or a function of one."""
-    return iterator._items
-
-
-def iterated_label_of(iterator: smach.Iterator) -> str:
-    """Return the label of the state that an Iterator executes, '' while it has none."""
-    return iterator._state_label
+# which outcomes of its states a Concurrence maps to which of its own
+outcome_map_of: Callable[[Any], Mapping[str, Mapping[str, str]]] = attrgetter('_outcome_map')
+# which outcome of the last item an Iterator maps to which of its own
+final_outcomes_of: Callable[[Any], Mapping[str, str]] = attrgetter('_final_outcome_map')
+# the outcomes after which an Iterator goes on. If there are none, all not to break
+loop_outcomes_of: Callable[[Any], Collection[str]] = attrgetter('_loop_outcomes')
+# the outcomes after which it ends
+break_outcomes_of: Callable[[Any], Collection[str]] = attrgetter('_break_outcomes')
+# what it was given to iterate over: an iterable, or a function of one
+items_of: Callable[[Any], Any] = attrgetter('_items')
+# the state that it executes, and its label, '' while it has none
+iterated_state_of: Callable[[smach.Iterator], Optional[smach.State]] = attrgetter('_state')
+iterated_label_of: Callable[[smach.Iterator], str] = attrgetter('_state_label')
 
 
 def set_items(iterator: Any, items: object, state: Optional[smach.State]) -> None:
@@ -262,11 +195,6 @@ def set_items(iterator: Any, items: object, state: Optional[smach.State]) -> Non
 def set_states(concurrence: Any, states: Mapping[str, smach.State]) -> None:
     """Have a Concurrence execute other states."""
     concurrence._states = states
-
-
-def iterated_state_of(iterator: smach.Iterator) -> Optional[smach.State]:
-    """Return the state that an Iterator executes."""
-    return iterator._state
 
 
 # -- of any container, empty where it has none
@@ -295,6 +223,37 @@ def remapping_of(container: object, label: str) -> Mapping[str, str]:
     return tables.get(label) or {}
 
 
+class ClassSteps(NamedTuple):
+    """The way in which the machines of a class step.
+
+    `once`: what the class does for a step. `is_asked`: whether it answers itself whether there is
+    a preempt request. `tells_transitions`: whether it wants every transition told. `is_smachs`:
+    whether nobody but SMACH and this package has a say in it.
+    """
+
+    once: object
+    is_asked: bool
+    tells_transitions: bool
+    is_smachs: bool
+
+
+class KnownClasses(Dict[type, ClassSteps]):
+    """The way in which machines step, by class, looked up once in a trial: it may be patched."""
+
+    def __missing__(self, cls: Any) -> ClassSteps:
+        steps = self[cls] = ClassSteps(
+            getattr(cls, '_update_once', None),
+            cls.preempt_requested is not smach.State.preempt_requested,
+            cls.call_transition_cbs is not smach.Container.call_transition_cbs,
+            all(
+                each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
+                for each in cls.__mro__
+                if 'execute' in vars(each) or '_update_once' in vars(each)
+            ),
+        )
+        return steps
+
+
 class EngineProbe:
     """Finds out how the SMACH engine steps, when an execution comes to its first state.
 
@@ -306,8 +265,6 @@ class EngineProbe:
     """
 
     def __init__(self) -> None:
-        self._class: Optional[type] = None  # of the machine when it was looked at last
-        self._is_class_known = False
         self.stepped = False
         self.lock_is_held = False
         self.attentive = True
@@ -319,16 +276,14 @@ class EngineProbe:
         """Look closely from now on: a state around the machine was abandoned."""
         self.attentive = True
 
-    def begin_trial(self) -> None:
-        """Look at the machine's class again, which may have been patched since."""
-        self._is_class_known = False
-
     def begin_execution(self) -> None:
         """Forget what was seen: the next step looks again."""
         self.stepped = False
         self.attentive = True
 
-    def look(self, machine: smach.StateMachine, stays_attentive: bool) -> None:
+    def look(
+        self, machine: smach.StateMachine, stays_attentive: bool, classes: KnownClasses
+    ) -> None:
         """Find out how this engine steps. `stays_attentive`: it is to look closely in any case.
 
         Some engines hold the lock around a step, with a plain lock all do. Others leave it to the
@@ -338,30 +293,12 @@ class EngineProbe:
         # of a re-entrant lock
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
-        if not self._is_class_known or type(machine) is not self._class:
-            cls: Any = type(machine)
-            if cls is not self._class:
-                self._class, self._class_steps_as_drawn = cls, _steps_as_drawn(cls)
-            self._is_class_known = True
-            self._class_step = getattr(cls, '_update_once', None)
-            self._class_is_asked = cls.preempt_requested is not smach.State.preempt_requested
-            told = cls.call_transition_cbs
-            self.tells_transitions = told is not smach.Container.call_transition_cbs
-        self.stays_attentive = stays_attentive or self._class_is_asked
-        # nobody but SMACH and this package has a say in how the machine steps
+        steps = classes[type(machine)]
+        self.tells_transitions = steps.tells_transitions
+        self.stays_attentive = stays_attentive or steps.is_asked
         step = getattr(machine, '_update_once', None)
-        self.has_own_loop = (
-            self._class_steps_as_drawn and getattr(step, '__func__', None) is self._class_step
-        )
+        self.has_own_loop = steps.is_smachs and getattr(step, '__func__', None) is steps.once
 
     def __reduce__(self) -> Tuple[Type['EngineProbe'], Tuple[()]]:
         """A copied or pickled machine is looked at when it executes."""
         return EngineProbe, ()
-
-
-def _steps_as_drawn(cls: type) -> bool:
-    return all(
-        each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
-        for each in cls.__mro__
-        if 'execute' in vars(each) or '_update_once' in vars(each)
-    )

@@ -20,6 +20,7 @@ from ..scope.alarm_clock import AlarmClock
 from ..scope.clock import Clock, TreeClock
 from ..scope.scope import Reason, Scope, Waiting
 from ..settings.health import HealthFunction
+from ..smach_private import KnownClasses
 from .health_watch import HealthWatch
 from .resumed import ResumedTrial
 from .trial_budget import TrialBudget
@@ -84,6 +85,7 @@ class Tree:
         # ids of containers and states that are executed as preconditions now
         self._preconditions: Set[Tuple[int, int]] = set()
         self.restarts, self.resumed = Restarts(), ResumedTrial()
+        self.classes = KnownClasses()
         self.scope = Scope(
             look=lambda: Reason.SHUTDOWN if smach.is_shutdown() else None, clock=clock
         )
@@ -116,6 +118,7 @@ class Tree:
         self.resumed = ResumedTrial()
         self._questions = 0
         self._said.clear()
+        self.classes.clear()
         self.events.begin_trial(trial_id)
 
     def is_new(self, *about: str) -> bool:

@@ -274,7 +274,6 @@ class TreeNode:
     def begin_trial(self, trial_id: str) -> None:
         """Forget what belongs to a trial. The rates stay."""
         self.trial_id = trial_id
-        self.engine.begin_trial()
         self.tree.resumed.forget(self.records)
         self.records.begin_trial()
 
@@ -297,7 +296,7 @@ class TreeNode:
 
     def begin_stepping(self) -> None:
         """Find out at the first state of an execution what the engine is like."""
-        self.engine.look(self.machine, self.in_force.limits_autonomy)
+        self.engine.look(self.machine, self.in_force.limits_autonomy, self.tree.classes)
         self.tree.control.attend(self.engine)
         self.abandoned = self.tree.workers.abandoned
 

@@ -27,7 +27,6 @@ from smach_common.foreign import ends_program, error_text
 
 from ..identity import own_mark
 from ..smach_private import (
-    KeptParts,
     constants_of,
     data_of,
     hold_data,
@@ -300,31 +299,28 @@ def _keeps_key_sets() -> bool:
 _KEEPS_KEY_SETS = _keeps_key_sets()
 
 
-class StateView(KeptParts):
+class StateView:
     """A state's view of the userdata, kept for its next visit where that is safe.
 
-    This engine and the state's class decide that.
+    This engine and the state's class decide that. It may be used again while nothing that it was
+    made of has been exchanged: the machine looks at each visit.
 
-    It may be used again while nothing that it was made of has been exchanged: the machine looks at
-    each visit.
+    `state`: None where it is made for one visit. `keys`: those of the state, in and out.
     """
 
-    __slots__ = ('remapper',)
+    __slots__ = ('state', 'userdata', 'remapping', 'keys', 'remapper')
 
     def __init__(self, machine: smach.StateMachine, label: str, state: smach.State) -> None:
         self.remapping = remappings_of(machine)[label]
         self.userdata = machine.userdata
-        self.state = None
+        self.state: Optional[smach.State] = None
         if (
             _KEEPS_KEY_SETS
             and _has_plain_keys(state)
             and not own_mark(machine, 'hands_on_userdata')
         ):
-            self.state = state
-            self.input_keys, self.output_keys = keys_of(state)
-            self.remapper = smach.Remapper(
-                machine.userdata, self.input_keys, self.output_keys, self.remapping
-            )
+            self.state, self.keys = state, keys_of(state)
+            self.remapper = smach.Remapper(machine.userdata, *self.keys, self.remapping)
         else:
             self.remapper = view_of(machine, label, state, machine.userdata)
 
