@@ -162,11 +162,12 @@ def test_parameters_are_told_at_the_start_of_a_trial_where_they_are_not_the_defa
     assert (told['policy'], told['policy.wait_s'], 'policy.tries' in told) == ('ladder', 2.0, False)
 
 
-@pytest.mark.parametrize(
-    'name', [name for name in sorted(POLICIES) if 'times' in POLICIES[name].parameters]
-)
-def test_a_policy_does_it_as_often_as_its_parameters_say(name):
-    assert policy_named(name).times == POLICIES[name].parameters['times']
+@pytest.mark.parametrize('name', sorted(POLICIES))
+def test_a_policy_does_by_itself_as_with_its_default_parameters(name):
+    defaults = POLICIES[name].parameters
+    assert vars(policy_named(name, defaults)) == vars(policy_named(name))
+    settings = Settings.from_dict({'policy': dict(defaults, name=name)})
+    assert not settings.policy_parameters
 
 
 @pytest.mark.parametrize('times', [0, 1, 4])

@@ -144,8 +144,9 @@ def test_what_helped_last_after_the_same_kind_of_failure_is_looked_at_first():
     both = [each._replace(minutes=2.0) for each in both]
     for last in ways:
         evidence = [*both, *vain, result(last, LATER, True)]
-        other = [*vain, result(FAR if last.key == BACK.key else BACK, LATER, True)]
-        others = [each._replace(failure='another') for each in other]
+        other = FAR if last.key == BACK.key else BACK
+        others = [result(other, LATER, True, failure='another'), result(other, LATER, False)]
+        others += [result(other, BY_PERSON, True)]
         choice = Learned().choose(situation([*evidence, *others], (AGAIN, *ways)))
         assert choice.ways[0].key == last.key
 
@@ -256,8 +257,23 @@ def test_the_estimates_are_those_of_a_plain_count_to_the_last_digit(seed):
 
 def test_where_moved_ways_disappoint_it_goes_back_and_says_so():
     moved = [result(BACK, FIRST, False, hoped=0.9)] * 5
-    choice = Learned().choose(situation(vain_then_back(20) + moved))
-    assert choice.hoped is None and 'helped 0 of 5 times, and 4.5 were expected' in choice.remark
+    for before in ([], vain_then_back(20)):
+        choice = Learned().choose(situation(before + moved))
+        assert choice.hoped is None
+        assert 'helped 0 of 5 times, and 4.5 were expected' in choice.remark
+
+
+@pytest.mark.parametrize(
+    'moved',
+    [
+        [result(BACK, FIRST, False, hoped=0.9)] * 4 + [result(BACK, FIRST, None, hoped=0.9)],
+        [result(BACK, FIRST, True, hoped=1.0)] * 5,
+        [result(BACK, FIRST, number < 2, hoped=0.8) for number in range(5)],
+    ],
+    ids=['four are known', 'as expected', 'hardly below what was expected'],
+)
+def test_it_does_not_go_back_where_they_do_not_surely_disappoint(moved):
+    assert not Learned().choose(situation(moved)).remark
 
 
 # -- never dearer than by one attempt

@@ -28,7 +28,7 @@ def keyed_ways(menu: Menu) -> Keyed:
 
 
 def _reached(keyed: Keyed, tried: Collection[str]) -> int:
-    return max((way.reach for key, way in keyed if key in tried), default=0) if tried else 0
+    return max((way.reach for key, way in keyed if key in tried), default=0)
 
 
 class Escalating(Baseline):
