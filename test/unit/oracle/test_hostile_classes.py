@@ -8,6 +8,7 @@ from machines import Scripted, chain_of
 
 import smach
 from smach_oracle.oracle import OperatorHand, OracleContainer, oracle_of, unwrap
+from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.identity import WeakIdentityMap, is_same, truth_of
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.testing import Bench, fail
@@ -195,6 +196,20 @@ class Final(smach.Concurrence):
 
     def execute(self, *args):
         return smach.Concurrence.execute(self, *args)
+
+
+class FinalMachine(smach.StateMachine):
+    """A machine that lets nobody extend it."""
+
+    def __init_subclass__(cls, **more):
+        raise TypeError('it is final')
+
+
+def test_a_machine_whose_class_cannot_be_extended_is_refused():
+    machine = chain_of(Scripted(), machine_class=FinalMachine)
+    with pytest.raises(SettingsError, match=r'machine: .*can be extended \(it is final\)'):
+        OracleContainer.wrap(machine)
+    assert machine.execute() == 'done'
 
 
 def test_states_in_a_container_that_cannot_be_extended_get_no_oracle_and_a_warning_says_so(log):

@@ -1,5 +1,7 @@
 """Iterators of plain states: an item that fails is recovered as that item."""
 
+import contextlib
+
 import pytest
 from branch_machines import Item, inside, iterator_over
 from machines import (
@@ -265,6 +267,46 @@ def test_an_item_that_cannot_be_got_is_spoken_of_and_none_is_dropped(log):
     assert machine.run() == 'done'
     assert any('OSError' in text for text in warnings_in(log))
     assert each.tried in ([1, 2, 3, 4], [1, 2]), 'upstream takes the error for the end'
+
+
+class Listed(list):
+    """A user's own list of items."""
+
+    owner = 'eva'
+
+
+def test_a_user_who_looks_at_what_it_goes_through_sees_what_was_given():
+    class Looks(smach.Iterator):
+        seen = ()
+
+        def execute(self, parent_ud=None):
+            return super().execute(parent_ud)
+
+        def look(self):
+            items = self._items
+            self.seen = (len(items), items[1], bool(items), items.owner, repr(items), str(items))
+            assert not hasattr(items, 'friend') and not hasattr(items, '_owner')
+
+    def look(state, ud):
+        iterator.look()
+        return 'ok'
+
+    iterator = Looks(['done', 'aborted', 'preempted'], [], [], Listed([4, 5]), 'item', 'done')
+    with iterator:
+        smach.Iterator.set_contained_state('EACH', Scripted(look, look), loop_outcomes=['ok'])
+    assert watched(iterator).run() == 'done'
+    assert iterator.seen == (2, 5, True, 'eva', '[4, 5]', '[4, 5]')
+
+
+def test_a_first_item_that_cannot_be_got_is_spoken_of(log):
+    def items():
+        raise OSError('no list')
+        yield 1
+
+    machine = watched(iterator_over(Item(), items=items), settings=ASKS)
+    with contextlib.suppress(smach.InvalidUserCodeError):  # upstream takes it for the end
+        machine.run()
+    assert any('cannot get the item behind the beginning: OSError' in each for _, each in log)
 
 
 def test_a_preempt_while_an_item_is_asked_about_ends_the_iteration():

@@ -9,6 +9,7 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle.control.control import Control
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.scope.clock import Clock
 
 FROM_B = ('ok', 'aborted', 'preempted', 'stopped')
@@ -141,6 +142,78 @@ def test_a_branch_that_its_concurrence_ends_is_recovered_as_ever(fails):
     with held.begin():
         eventually(lambda: not held.running())
     assert (held.end(), sorted(trail.ran)) == ('done', ['CARRY', 'UNDOCK', 'UNDOCK', 'WATCH'])
+
+
+class Unheard(smach.Iterator):
+    """A user's own: it passes no preempt on."""
+
+    def request_preempt(self):
+        smach.State.request_preempt(self)
+
+
+def stopped_around(*script):
+    """What an inner machine of A and B runs where a container passes no preempt on to it.
+
+    A does what is in the script once the machine around it was asked to stop.
+    """
+    trail, gate = Trail(), Gate(heeds=False)
+
+    def first(state, ud):
+        gate(state, ud)
+        return script[0]
+
+    inner = machine_of(
+        A=(trail.state('A', first, *script[1:], 'ok'), {'ok': 'B'}),
+        B=(trail.state('B'), {'ok': 'done'}),
+    )
+    each = Unheard(['done', 'aborted', 'preempted'], [], [], [1], 'item', 'done')
+    with each:
+        smach.Iterator.set_contained_state('ONE', inner, loop_outcomes=['done'])
+    with Held(machine_of(ALL=(each, {'done': 'done'}))) as held:
+        held.hand.set_breakpoint('B')
+        held.begin()
+        assert gate.entered.wait(LIMIT_S)
+        held.machine.request_preempt()
+        gate.opened.set()
+        eventually(lambda: not held.running())
+    held.end()
+    return trail.ran, held
+
+
+def test_no_breakpoint_holds_a_machine_while_the_one_around_it_is_to_stop():
+    ran, held = stopped_around('ok')
+    assert ran == ['A', 'B'] and not held.of(EventKind.HOLD_START)
+
+
+def test_nothing_is_repeated_in_a_machine_while_the_one_around_it_is_to_stop():
+    ran, held = stopped_around('aborted')
+    assert ran == ['A'] and not held.of(EventKind.DECISION)
+
+
+def test_a_machine_is_recovered_as_ever_where_a_concurrence_ends_the_one_around_it():
+    trail, entered = Trail(), threading.Event()
+
+    def fail(state, ud):
+        entered.set()
+        assert wait_for(around.preempt_requested, LIMIT_S)
+        return 'aborted'
+
+    inner = machine_of(A=(trail.state('A', fail, 'ok'), {'ok': 'done'}))
+    each = Unheard(['done', 'preempted'], [], [], [1], 'item', 'done')
+    with each:
+        smach.Iterator.set_contained_state('ONE', inner, loop_outcomes=['done'])
+    around = machine_of(ALL=(each, {'done': 'done'}))
+    beside = smach.Concurrence(
+        ['done'], 'done', outcome_map={}, child_termination_cb=lambda outcomes: True
+    )
+    with beside:
+        smach.Concurrence.add('LEFT', around)
+        right = trail.state('RIGHT', *[lambda state, ud: entered.wait(LIMIT_S) and 'ok'] * 9)
+        smach.Concurrence.add('RIGHT', right)
+    held = Held(machine_of(C=(beside, {'done': 'done'})))
+    with held.begin():
+        eventually(lambda: not held.running())
+    assert (held.end(), sorted(trail.ran)) == ('done', ['A', 'A', 'RIGHT'])
 
 
 @pytest.mark.parametrize('services', [True, False])

@@ -169,6 +169,21 @@ def test_a_machine_that_fails_as_a_precondition_asks_nobody():
     assert 'it runs as a precondition' in machine.of(EventKind.GIVE_UP)[0].text
 
 
+def test_a_machine_that_a_precondition_executes_itself_asks_nobody():
+    aim = Scripted('ok', 'aborted')
+    look, expert = chain(AIM=aim), FakeExpert(supersede('ok'))
+    machine = Watched(
+        chain(LOOK=look, PICK=Scripted('aborted')),
+        name='TOP',
+        expert=expert,
+        preconditions={'PICK': [lambda userdata: look.execute() == 'done']},
+        settings={'states': {'AIM': {'max_recoveries': 0}}},
+    )
+    assert machine.run() == 'done'
+    assert not expert.questions
+    assert 'it runs as a precondition' in machine.of(EventKind.GIVE_UP)[0].text
+
+
 # -- escalate: true
 
 

@@ -70,6 +70,20 @@ def test_of_a_pair_the_check_alone_is_called():
     assert not opened
 
 
+def test_of_a_pair_whose_check_holds_or_cannot_tell_nothing_more_is_said():
+    def gripper_is_open(userdata):
+        return True
+
+    def open_it(userdata):
+        raise AssertionError('nobody is to open it')
+
+    _, found = asked({'B': [(gripper_is_open, open_it), ('C', open_it)]})
+    assert [each[1:] for each in found] == [
+        (True, 'gripper_is_open returned True'),
+        (None, 'only running C would tell'),
+    ]
+
+
 def test_what_it_writes_is_dropped_and_what_it_raises_is_told():
     def meddles(userdata):
         userdata.cup = 'broken'

@@ -253,6 +253,16 @@ def test_a_branch_may_need_a_state_elsewhere():
     assert ends(watched) == [('TOP/ALL', 'EACH', '/LOOK', 'met', '')]
 
 
+def test_none_is_run_in_a_machine_that_is_not_executed():
+    """A script executes the nested machine by itself."""
+    look = Scripted()
+    pick = chain(GRASP=Scripted('aborted'))
+    watched = wrapped(chain(SEE=chain(LOOK=look), PICK=pick), 'GRASP', 'SEE/LOOK')
+    assert pick.execute() == 'done'
+    assert not look.runs
+    assert ends(watched)[0][3:] == ('not met', "'SEE/LOOK' cannot be run: there is no such state")
+
+
 def test_a_state_that_is_not_repeated_by_itself_is_not_met():
     pour = Scripted()
     watched = wrapped(

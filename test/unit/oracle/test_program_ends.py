@@ -119,3 +119,27 @@ def test_an_error_of_the_author_that_hides_an_exit_is_a_failure():
     with pytest.raises(smach.InvalidUserCodeError):
         machine.machine.execute()
     assert len(machine.of(EventKind.FAILURE)) == 2
+
+
+class EndsAt:
+    """A value in the userdata that ends the program the n-th time that it is copied or pickled."""
+
+    def __init__(self, count):
+        self.left = count
+
+    def __reduce_ex__(self, protocol):
+        self.left -= 1
+        if self.left < 1:
+            raise KeyboardInterrupt
+        return EndsAt, (9,)
+
+
+@pytest.mark.parametrize('count', range(1, 7))
+def test_an_exit_within_a_value_of_the_userdata_ends_the_program(count):
+    """It is copied as a state is entered, compared and copied by a recovery, and restored."""
+    settings = {'deep_copy_keys': ['cup'], 'states': {'B': {'preconditions': ['A']}}}
+    machine = Watched(chain_of(Scripted(), Scripted('aborted')), settings=settings)
+    value = machine.machine.userdata.cup = EndsAt(count)
+    with pytest.raises(KeyboardInterrupt):
+        machine.machine.execute()
+    assert not value.left

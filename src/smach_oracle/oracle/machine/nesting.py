@@ -63,9 +63,7 @@ def nodes_in(state: smach.State) -> List[TreeNode]:
 
 def gave_up_in(state: smach.State) -> bool:
     """Whether the oracle of a container in a state, or of the state itself, has given up."""
-    return isinstance(state, smach.Container) and any(
-        node.execution.unrecovered for node in nodes_in(state)
-    )
+    return any(node.execution.unrecovered for node in nodes_in(state))
 
 
 def branching_below(

@@ -159,7 +159,7 @@ def _judge(
 
 def _ended_as_intended(state: smach.State) -> bool:
     """Whether a container in a state has ended by an outcome that its author means so."""
-    for node in nodes_in(state) if isinstance(state, smach.Container) else ():
+    for node in nodes_in(state):
         for visit in list(node.records.history.visits)[-1:]:
             within = states_of(node.machine).get(visit.state)
             if (

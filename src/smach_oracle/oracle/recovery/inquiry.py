@@ -39,8 +39,6 @@ class Inquiry:
         self._now = recovery.scope.clock.now
         self._end = self._now() + deadline_s if deadline_s else None
         self._cancelled = recovery.question_cancelled = threading.Event()
-        if self._scope.told is not None:
-            self._cancelled.set()  # it came before there was an event
         self._unfit = 0
 
     def run(self) -> Optional[Answer]:

@@ -209,9 +209,8 @@ class _Elsewhere:
 
     def __init__(self, recovery: Recovery, place: TreePlace) -> None:
         """:raises NotMet: where the state cannot be run now."""
-        way = jump_path_to(recovery.node, place)
-        if way is None:
-            raise NotMet('{} is in no container that is being executed'.format(place.path))
+        # the place was found from here, so a way leads there
+        way = cast(JumpPath, jump_path_to(recovery.node, place))
         _check(way)
         self._own = recovery.watch.gate
         self._userdata = recovery.node.machine.userdata
