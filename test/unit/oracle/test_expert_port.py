@@ -17,6 +17,7 @@ from machines import (
     watched,
 )
 
+import smach
 import smach_oracle.oracle.recovery.inquiry as inquiry
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.records.events import EventKind
@@ -189,3 +190,37 @@ def test_what_ends_a_program_passes_through_the_experts_port(stop):
     with pytest.raises(stop):
         machine.run()
     assert machine.machine.is_running() is False
+
+
+def test_what_a_port_tells_after_the_program_was_interrupted_is_no_step_of_the_next_trial(
+    monkeypatch,
+):
+    deaf = Deaf()
+
+    def interrupted():
+        if deaf.asked.is_set():
+            raise KeyboardInterrupt
+        return False
+
+    def leave(state, ud):
+        deaf.leave()
+        return 'ok'
+
+    machine = watched(
+        Scripted('aborted', leave), expert=FakeExpert(deaf), settings={'max_recoveries': 0}
+    )
+    monkeypatch.setattr(smach, 'is_shutdown', interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        machine.run()
+    monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
+    assert machine.run() == 'done'
+    assert not machine.of(EventKind.QUERY_CLAIMED)
+
+
+def test_what_nobody_knows_that_a_port_tells_is_no_matter():
+    def tells(question, cancelled, progress):
+        progress('thinking', 'eva', 'hard')
+        return goto('C')
+
+    machine, _ = asking(tells)
+    assert machine.run() == 'done' and machine.visits() == ['A', 'B', 'C']

@@ -441,6 +441,22 @@ def test_what_was_learned_stays_in_the_rates_file(tmp_path):
     assert first_ways(learning(settings=settings), 1)[0].startswith('from ')
 
 
+def test_a_machine_says_once_in_a_trial_that_it_goes_by_the_menus_own_order_again(tmp_path):
+    path = tmp_path / 'rates.json'
+    settings = {'rates_file': str(path)}
+    first_ways(learning(settings=settings), 12)
+    told = json.loads(path.read_text())
+    state = told['containers']['']['C']
+    state['ways']['results'] = [
+        ' '.join([*row.split(' ')[:3], '0', '0.1', '0.9']) for row in state['ways']['results']
+    ]
+    path.write_text(json.dumps(told))
+    machine = learning(settings=settings)
+    assert first_ways(machine, 1) == ['again']
+    (warning,) = machine.of(EventKind.WARNING)
+    assert warning.state == 'C' and 'have helped 0 of ' in warning.text
+
+
 def test_escalating_notes_the_results_that_learned_goes_by(tmp_path):
     settings = {'rates_file': str(tmp_path / 'rates.json')}
     first_ways(learning('escalating', settings=settings), 12)

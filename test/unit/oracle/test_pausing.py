@@ -306,3 +306,16 @@ def test_what_an_operator_wants_between_two_trials_is_no_event_of_either() -> No
         assert not held.of(EventKind.OPERATOR_COMMAND)
         assert held.run() == 'done'
         assert held.events[-1].kind is EventKind.TRIAL_END
+
+
+def test_an_exit_while_an_operator_holds_the_machine_ends_the_hold() -> None:
+    def interrupt(event):
+        if event.kind is EventKind.HOLD_START:
+            raise KeyboardInterrupt
+
+    held = Held(chain_of(Scripted()))
+    held.hand.pause()
+    held.machine.events.observers.append(interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        held.run()
+    assert held.told(EventKind.HOLD_END) == ['stopped'] and not held.held()

@@ -185,6 +185,8 @@ def test_whatever_the_state_ends_with_is_replaced(end, log):
     assert machine.visits() == ['A', 'A', 'C'] and failures(machine) == ['A']
     left_with = machine.of(EventKind.TRANSITION)[1].outcome
     assert left_with == (end if isinstance(end, str) else '')
+    counted = [row.outcome for row in machine.machine.transition_counts() if row.to == 'ORACLE']
+    assert counted == ['aborted', left_with or 'taken_out']
     assert (machine.rate('A').successes, machine.rate('A').failures) == (0, 1)
     assert any('broken by the preempt' in text for _, text in log) is isinstance(end, Exception)
 

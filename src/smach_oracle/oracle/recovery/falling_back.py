@@ -1,6 +1,6 @@
 """What is done where nobody answers a question (`on_no_answer`)."""
 
-from typing import Optional
+from typing import Optional, cast
 
 from ..asking.question import names
 from ..machine.places import JumpPath, jump_path_to, place_named
@@ -19,9 +19,9 @@ def fall_back(recovery: Recovery) -> Verdict:
     if verb == 'goto':
         way = _jump_path_back(recovery)
         problem = _why_not(recovery, way) or recovery.budget.take_recovery()
-        if way is not None and not problem:
+        if not problem:
             recovery.record.fallbacks += 1
-            return recovery.jump(way, why)
+            return recovery.jump(cast(JumpPath, way), why)
         _warn(recovery, 'cannot go to {!r}: {}; stopping'.format(target, problem))
     elif verb == 'give_up':
         if target in node.machine.get_registered_outcomes():

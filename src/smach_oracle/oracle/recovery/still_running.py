@@ -5,6 +5,7 @@ limit is never abandoned, so a person is asked, while it runs, whether to wait o
 """
 
 import threading
+from functools import partial
 from typing import NamedTuple, Optional
 
 import smach
@@ -91,7 +92,7 @@ class WatchedVisit:
         if recovery is not None:
             recovery.cancel(Reason.ENDED)
             text = '{} has ended'.format(self._record.label)
-            self._close(EventKind.QUERY_CANCELLED, text)
+            self._close(recovery, EventKind.QUERY_CANCELLED, text)
         preempted = self._node.machine.preempt_requested()
         if self._answered and self._answer is None and not preempted:
             self._warn('{} has ended by itself; the answer is not used'.format(self._record.label))
@@ -123,7 +124,8 @@ class WatchedVisit:
         node, failure = self._node, self._failure()
         scope = Scope(node.execution.scope)
         recovery = Recovery(node, self._record, still_running(failure), scope=scope)
-        recovery.takes, recovery.begin_question = self._takes, self._begin_question
+        recovery.takes = partial(self._takes, recovery)
+        recovery.begin_question = self._begin_question
         with self._lock:
             self._recovery = recovery
             if self._ended.is_set():
@@ -143,12 +145,12 @@ class WatchedVisit:
         if recovery.stopped():
             if not self._ended.is_set():
                 node.tree.early_end.end_at_shutdown()
-                self._close(EventKind.QUERY_CANCELLED, recovery.why_taken_back())
+                self._close(recovery, EventKind.QUERY_CANCELLED, recovery.why_taken_back())
             return False
         if answer is None:
             why_over = budget.why_over()
             why = '; '.join(filter(None, (recovery.why_no_answer, why_over)))
-            self._close(EventKind.QUERY_EXPIRED, why + '; it runs on')
+            self._close(recovery, EventKind.QUERY_EXPIRED, why + '; it runs on')
             return not why_over
         if self._is_wait_on(answer):
             smach.loginfo('{}: {} waits on'.format(self._place(), answer.by or 'the expert'))
@@ -196,25 +198,25 @@ class WatchedVisit:
         ran = ran_in_words(self._ran_s(), self._record.longest_s)
         recovery.cause = 'it still runs after ' + ran
 
-    def _takes(self, answer: Answer) -> bool:
+    def _takes(self, recovery: Recovery, answer: Answer) -> bool:
         """Close the question, as it is answered. Return False where it was taken back before."""
         with self._lock:
-            is_open = bool(self._take_open())
+            is_open = bool(self._take_open(recovery))
             self._answered = is_open and not self._is_wait_on(answer)
         if not is_open:
             smach.logwarn('{}: the answer came too late and is not used'.format(self._place()))
         return is_open
 
-    def _close(self, kind: EventKind, text: str) -> None:
+    def _close(self, recovery: Recovery, kind: EventKind, text: str) -> None:
         """Tell how the question, if one is open, has ended."""
         with self._lock:
-            recovery, question_id = self._recovery, self._take_open()
-        if recovery is not None and question_id:
+            question_id = self._take_open(recovery)
+        if question_id:
             recovery.tell(kind, text=text, query_id=question_id)
 
-    def _take_open(self) -> str:
+    def _take_open(self, recovery: Recovery) -> str:
         """Return the id of the question that is open, once, '' for none."""
-        question_id = self._recovery.question_id if self._recovery is not None else ''
+        question_id = recovery.question_id
         closed_id, self._closed_id = self._closed_id, question_id
         return '' if question_id == closed_id else question_id
 
