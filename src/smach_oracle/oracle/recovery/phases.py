@@ -51,6 +51,7 @@ from .verdict import (
     JumpTo,
     Supersede,
     Verdict,
+    leads_to,
 )
 
 # -- what comes before a decision
@@ -353,9 +354,10 @@ class OracleState(smach.State):
             self._recovery = recovery
             self._verdict = None
 
-    def execute(self, ud: smach.UserData) -> None:
-        """Recover from the failure handed to `begin`. The machine follows `take_verdict`.
+    def execute(self, ud: smach.UserData) -> str:
+        """Recover from the failure handed to `begin`.
 
+        :returns: where the machine goes, '' where it raises. It follows the verdict itself.
         :raises TrialError: where no failure was handed over.
         """
         recovery = self._recovery
@@ -363,7 +365,8 @@ class OracleState(smach.State):
             raise TrialError('the meta state is entered by failures alone')
         try:
             verdicts = (phase(recovery) for phase in PHASES)
-            self._verdict = next(each for each in verdicts if each is not None)
+            self._verdict = verdict = next(each for each in verdicts if each is not None)
+            return leads_to(verdict)
         finally:
             with self._lock:
                 self._recovery = None

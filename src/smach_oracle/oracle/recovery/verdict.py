@@ -163,6 +163,20 @@ class Departure:
         return isinstance(self.verdict, JumpTo) and self.verdict.decided_by is node
 
 
+def leads_to(verdict: Verdict) -> str:
+    """Return the state or outcome that the meta state leads to.
+
+    It is '' where it raises, and where a level above goes on.
+    """
+    if arrives_at(verdict) is not None:
+        return ''
+    if isinstance(verdict, JumpTo):
+        return verdict.jump_path.first_label
+    if isinstance(verdict, Supersede):
+        return verdict.outcome
+    return verdict.ending.state or verdict.ending.outcome or ''
+
+
 # -- endings
 
 
