@@ -4,7 +4,17 @@ import copy
 import pickle
 
 import pytest
-from machines import OUTCOMES, FakeExpert, Scripted, Watched, chain_of, supersede, watched
+from machines import (
+    OUTCOMES,
+    FakeExpert,
+    Scripted,
+    Watched,
+    chain_of,
+    give_up,
+    goto,
+    supersede,
+    watched,
+)
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -206,10 +216,14 @@ def test_a_machine_may_begin_at_any_other_state():
     assert machine.visits() == ['B']
 
 
-def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state():
+@pytest.mark.parametrize(
+    'answer, told', [(supersede('ok'), 'ok'), (goto('B'), 'B'), (give_up('aborted'), 'aborted')]
+)
+def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state(answer, told):
     machine = watched(
         Scripted('aborted'),
-        expert=FakeExpert(supersede('ok')),
+        Scripted(),
+        expert=FakeExpert(answer),
         settings={'states': {'A': {'prior': 1.0}}},
     )
     meta, seen = machine.machine.get_children()['ORACLE'], []
@@ -221,8 +235,8 @@ def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state()
         return outcome
 
     meta.execute = hooked
-    assert machine.run() == 'done'
-    assert seen == [(True, 'ok')]
+    assert machine.run() == ('aborted' if told == 'aborted' else 'done')
+    assert seen == [(True, told)]
 
 
 def test_the_meta_state_executes_for_a_failure_alone():
