@@ -28,6 +28,7 @@ def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp
         smach.StateMachine.add('OPEN', Opens(), {'succeeded': 'succeeded'})
     machine = smach.StateMachine(['succeeded'])
     machine.userdata.mine = open('/dev/null')
+    machine.userdata['of a \udcff file'] = 'a text'
     with machine:
         smach.StateMachine.add('A', Opens(), {'succeeded': 'AGAIN'}, remapping={'file': 'other'})
         again = Opens(threading.Lock)
@@ -44,6 +45,7 @@ def test_a_value_that_cannot_be_stored_is_named_with_the_state_that_wrote_it(tmp
     kind = '(_io.TextIOWrapper)'
     assert named == [
         "TOP: userdata key 'mine' {} of the script".format(kind),
+        "TOP: userdata key 'of a \\\\udcff file' (builtins.str) of the script",
         "TOP: userdata key 'other' {} of TOP/A".format(kind),
         "TOP/IN: userdata key 'file' {} of TOP/IN/OPEN".format(kind),
     ]
