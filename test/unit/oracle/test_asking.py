@@ -174,6 +174,13 @@ def test_the_id_of_a_question_keeps_its_old_name_with_a_warning():
     assert told[0].filename == __file__
 
 
+def test_after_the_first_answer_that_does_not_fit_it_asks_again_at_once():
+    machine, expert = asking(goto('NOWHERE'), goto('C'))
+    assert machine.run() == 'done'
+    first, second = expert.questions
+    assert second.deadline_s > first.deadline_s - 0.9
+
+
 def test_nonsense_without_end_ends_at_the_deadline_and_does_not_spin():
     machine, expert = asking(*[goto('NOWHERE')] * 10000, deadline_s=0.3)
     assert machine.run() == 'aborted'

@@ -142,6 +142,30 @@ def test_a_state_that_is_not_there_is_complained_of_to_a_function():
     ]
 
 
+def test_an_outcome_that_none_of_the_states_meant_has_is_complained_of():
+    complaints = []
+    failing = {'A': {'failure_outcomes': ['preempted', 'ok']}, '**': {'intended_outcomes': []}}
+    machine = chain_of(Scripted(outcomes=('ok', 'aborted')))
+    OracleContainer.wrap(machine, settings={'states': failing}, strict=complaints.append)
+    assert [(each.error.key, each.name) for each in complaints] == [
+        ('states.A.failure_outcomes', 'preempted')
+    ]
+    complaints.clear()
+    everywhere = {'failure_outcomes': ['preempted', 'nowhere']}  # the machine may be preempted
+    OracleContainer.wrap(machine, settings=everywhere, strict=complaints.append)
+    assert [each.name for each in complaints] == ['nowhere']
+
+
+def test_where_nothing_recovers_a_state_may_be_called_as_the_meta_state_would_be():
+    state = Scripted()
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('ORACLE', state, {'ok': 'done'})
+    machine = Watched(machine, recover=False)
+    assert [machine.run(), machine.run()] == ['done', 'done']
+    assert len(machine.visits()) == 2 and machine.rate('ORACLE').successes == 2
+
+
 def test_a_plain_success_is_told_to_who_registered_for_transitions():
     told = []
     machine = watched(Scripted(), Scripted(), Scripted())
