@@ -1,14 +1,19 @@
 """Settings: what is allowed, and errors that name the key, the value and what is allowed."""
 
 import dataclasses
+import re
+from pathlib import Path
 
 import pytest
+import yaml
 
 from smach_oracle.oracle.errors import OracleError, SettingsError
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer, InterfaceStart
 from smach_oracle.oracle.settings.preconditions import parse_preconditions
 from smach_oracle.oracle.settings.settings import Settings
 from smach_oracle.oracle.settings.written import WrittenFloat, WrittenInt, plain
+
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_nobody_changes_settings_in_place():
@@ -45,6 +50,14 @@ def test_the_defaults_are_those_of_the_design():
     assert settings.failing_outcomes is None, 'by the words of their names'
     assert settings.deadline_s > 0, 'never an endless wait unless asked for'
     assert Settings.from_dict(None) == settings
+
+
+def test_the_file_that_shows_the_settings_has_their_defaults():
+    lines = (ROOT / 'launch/oracle.yaml').read_text(encoding='utf-8').splitlines()
+    keys = '\n'.join(line[2:] for line in lines if re.match('# +([a-z_]+:|#)', line))
+    shown = yaml.safe_load(keys.partition('\nstates:')[0])
+    del shown['expert']['interfaces']  # an example
+    assert len(shown) > 20 and Settings.from_dict(shown) == Settings.from_dict({})
 
 
 @pytest.mark.parametrize(
