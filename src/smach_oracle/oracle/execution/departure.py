@@ -17,12 +17,12 @@ from ..machine.tree_node import TreeNode
 from ..machine.workers import request_preempt
 from ..records.events import FailureKind
 from ..recovery.failure import Failure
-from ..recovery.verdict import Departure, GiveUp, JumpTo, Verdict, arrives_at
+from ..recovery.verdict import Departure, GiveUp, JumpTo, Verdict
 from ..smach_private import current_label_of, current_state_of, states_of
 
 
-def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
-    """Leave the containers between a failure and the level that goes on.
+def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> bool:
+    """Leave the containers between a failure and the level above that goes on.
 
     Return whether they are left.
 
@@ -32,9 +32,6 @@ def depart(node: TreeNode, label: str, verdict: Verdict) -> bool:
     To be called in the thread of the failed state's container, its lock not held: what runs in the
     containers is preempted.
     """
-    level = arrives_at(verdict)
-    if level is None:
-        return False
     left_nodes = _nodes_left_for(node, level)
     if not left_nodes:
         return False

@@ -421,7 +421,8 @@ class Step:
         node = self._node
         if node.tree.early_end.why is not None:
             return Preempted()
-        if arrives_at(verdict) in (None, node) or depart(node, self._record.label, verdict):
+        level = arrives_at(verdict)
+        if level is None or level is node or depart(node, self._record.label, verdict, level):
             return verdict
         # another one, of a branch beside, leaves the container
         return Preempted(ContainerEnding(outcome=leaving_outcome(node, occasion.failure)))
