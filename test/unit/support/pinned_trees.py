@@ -104,7 +104,7 @@ class Told(Executed):
 
     def tell(self, what: str, value: Any) -> None:
         """Add a line."""
-        self.lines.append('{} {}'.format(what, _written(value)).rstrip())
+        self.lines.append('{} {}'.format(what, written(value)).rstrip())
 
     def run(self, trials: int) -> None:
         """Execute it as often, and tell what is known of it then.
@@ -297,17 +297,17 @@ def _stored(path: str) -> List[str]:
     try:
         (trial,) = store.trials()
         lines = [
-            'MOMENT {} {}'.format(each.seq, _written(each._replace(at=0)))
+            'MOMENT {} {}'.format(each.seq, written(each._replace(at=0)))
             for each in store.moments(trial.number)
         ]
         tree = read_tree(store, trial.number, CODECS)
         lines += [
-            'WHOLE {} {}'.format(name, _written(value))
+            'WHOLE {} {}'.format(name, written(value))
             for name, value in sorted(tree.whole.items())
             if name not in NOT_TOLD
         ]
         lines += [
-            'CONTAINER {} {}'.format(name, _written(vars(container)))
+            'CONTAINER {} {}'.format(name, written(vars(container)))
             for name, container in sorted(tree.containers.items())
         ]
         return lines
@@ -315,7 +315,8 @@ def _stored(path: str) -> List[str]:
         store.close()
 
 
-def _written(value: Any) -> str:
+def written(value: Any) -> str:
+    """A value as text, without times, ids and addresses."""
     text = json.dumps(_plain(value), ensure_ascii=False)
     text = '' if text == '{}' else KEY.sub(r'\1: ', text)
     for pattern, name in ((SECONDS, '# s'), (ADDRESS, ''), (ID, '#')):
