@@ -9,7 +9,7 @@ import smach
 from ..machine import nesting
 from ..machine.execution import why_no_outcome
 from ..machine.items import TrackedItems
-from ..machine.nesting import branching_below
+from ..machine.nesting import branching_below, children_of
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
@@ -217,14 +217,16 @@ def wrapper_of(state: object) -> Optional[ContainerWrapper]:
 
 def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
     """Return them, each with its path, the outermost first."""
-    parent = node.parent
-    if parent is None or not node.runs_in_branch:
+    if node.parent is None or not node.runs_in_branch:
         return []
-    found = []
-    for below, container in branching_below(parent.machine):
+    container: object = node.parent.machine
+    path, found = node.parent.key, []
+    for label in node.labels_from_parent:
+        container = children_of(container).get(label)
+        path = '{}/{}'.format(path, label)
         wrapper = wrapper_of(container)
-        if wrapper is not None and node.labels_from_parent[: len(below)] == below:
-            found.append(('/'.join((parent.key,) + below), wrapper))
+        if wrapper is not None:  # the last one may be the container of the node itself
+            found.append((path, wrapper))
     return found
 
 
