@@ -95,6 +95,26 @@ def test_a_cancel_on_any_level_around_ends_a_wait_at_once(level, waits_for):
     assert [each.reason for each in scopes] == [None] * level + [Reason.PREEMPTED] * (3 - level)
 
 
+class Bell:
+    """Counts how often it is rung."""
+
+    rung = 0
+
+    def ring(self):
+        self.rung += 1
+
+
+@pytest.mark.parametrize('is_early', [False, True])
+def test_what_is_to_be_told_of_a_cancel_is_told_at_once_also_where_it_came_before(is_early):
+    scope, bell = Scope(), Bell()
+    if is_early:
+        scope.cancel(Reason.LEFT_BEHIND)
+    scope.tell(bell)
+    assert bell.rung == is_early
+    scope.cancel(Reason.LEFT_BEHIND)
+    assert bell.rung == 1 + is_early
+
+
 def test_a_reason_of_which_nobody_tells_is_looked_for_and_a_wake_has_it_seen_at_once():
     seen = []
     look = Scope(look=lambda: seen[0] if seen else None, clock=SlowPoll())
