@@ -88,7 +88,7 @@ class OracleContainer(smach.StateMachine):
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
         tree = Tree(OracleContainer, recover, expert, health)
         self._oracle = TreeNode(self, tree, checked, name)
-        self._oracle.in_force.strict = strict
+        self._oracle.in_force.strict, self._oracle.in_force.nested = strict, checked.nested
 
     @classmethod
     def wrap(

@@ -129,6 +129,32 @@ def test_what_cannot_be_wrapped_stays_bare():
     assert machine.execute() == 'done'
 
 
+@pytest.mark.parametrize('nested, has', [(True, True), (False, False), (['OTHER'], False)])
+def test_what_is_nested_in_a_machine_that_is_built_has_an_oracle_as_the_setting_says(nested, has):
+    built = OracleContainer(['done', 'aborted', 'preempted'], settings={'nested': nested})
+    inner = chain_of(Scripted())
+    with built:
+        smach.StateMachine.add('INNER', inner)
+        smach.StateMachine.add('OTHER', chain_of(Scripted()))
+    assert built.execute() == 'done'
+    assert ('ORACLE' in inner.get_children()) is has
+
+
+@pytest.mark.parametrize('strict', [True, False])
+def test_a_machine_that_is_built_may_have_names_in_its_settings_that_no_state_has(strict, log):
+    built = OracleContainer(
+        ['done', 'aborted', 'preempted'], settings={'states': {'NO': {}}}, strict=strict
+    )
+    with built:
+        smach.StateMachine.add('A', Scripted(), {'ok': 'done'})
+    if strict:
+        with pytest.raises(SettingsError, match='states.NO'):
+            built.execute()
+    else:
+        assert built.execute() == 'done'
+        assert any('states.NO' in text for level, text in log if level == 'warn')
+
+
 def test_a_state_that_is_not_there_is_complained_of_to_a_function():
     complaints = []
     OracleContainer.wrap(
