@@ -3,6 +3,7 @@
 import contextlib
 import gc
 import os
+import subprocess
 import sys
 
 from smach_oracle.oracle.records import folder_locks
@@ -156,3 +157,19 @@ def test_a_child_that_claims_nothing_keeps_no_claim(tmp_path):
         assert is_claimed(path, 'TASK', False)
         del owner
         assert not is_claimed(path, 'TASK', True), 'the child lives'
+
+
+PROGRAM = """
+import os, sys
+from smach_oracle.oracle.records.folder_locks import claim
+class Owner: pass
+owner = Owner()
+claim(sys.argv[1], 'TASK', owner)
+os.closerange(3, 100)
+"""
+
+
+def test_a_program_that_closes_all_files_as_a_daemon_does_ends_without_a_word(tmp_path):
+    program = [sys.executable, '-c', PROGRAM, str(tmp_path / 'rates.json')]
+    ended = subprocess.run(program, stderr=subprocess.PIPE, check=True, timeout=60)
+    assert not ended.stderr
