@@ -162,6 +162,17 @@ def test_parameters_are_told_at_the_start_of_a_trial_where_they_are_not_the_defa
     assert (told['policy'], told['policy.wait_s'], 'policy.tries' in told) == ('ladder', 2.0, False)
 
 
+@pytest.mark.parametrize('policy, goes_by_ways', [('retry', False), ('escalating', True)])
+def test_costs_are_told_at_the_start_of_a_trial_whose_policy_goes_by_them(policy, goes_by_ways):
+    machine = failing(policy)
+    machine.run()
+    told = machine.of(EventKind.TRIAL_START)[0].data['settings']
+    of_all = {'memory', 'estimator', 'prior', 'moderate_from', 'high_from', 'max_recoveries'}
+    costs = {key for key in told if key.startswith('cost.')}
+    assert told.keys() - costs == {'policy', *of_all}
+    assert bool(costs) == goes_by_ways
+
+
 @pytest.mark.parametrize('name', sorted(POLICIES))
 def test_a_policy_does_by_itself_as_with_its_default_parameters(name):
     defaults = POLICIES[name].parameters

@@ -31,6 +31,16 @@ def test_a_pause_lets_the_state_end_and_holds_before_the_next() -> None:
     assert [event.seq for event in held.events] == list(range(len(held.events)))
 
 
+def test_the_log_has_each_command_its_effect_and_who_gave_it(log) -> None:
+    hand = Held(chain_of(Scripted()), name='TOP').hand
+    hand.pause('eva')
+    hand.resume()
+    assert [text for level, text in log if level == 'info'][-2:] == [
+        'TOP: pause by eva: TOP does not run; it will wait before its first state',
+        'TOP: resume: TOP does not run; it will not wait',
+    ]
+
+
 def test_a_resume_before_anything_waits_says_what_runs_on() -> None:
     gate = Gate()
     with Held(chain_of(Scripted(gate), Scripted())).begin() as held:

@@ -40,13 +40,13 @@ class Resumption(NamedTuple):
     at: float  # s since the epoch, when that was
     asks: bool  # a person is asked before anything moves
     changes: List[str]  # how the script differs from the one that was stopped
-    marks: Marks = {}  # of the states that have begun
+    marks: Marks  # of the states that have begun
+    is_in_doubt: bool  # whether states may have run that are not stored
+    is_earlier: bool  # whether later moments of the trial are stored
+    renamed: Mapping[str, str]  # paths of states by those that they had
+    structure: str  # id of that which was stopped
+    rule: Optional[FailureRule]  # by which its failures were told, None: not known
     begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
-    is_in_doubt: bool = False  # whether states may have run that are not stored
-    is_earlier: bool = False  # whether later moments of the trial are stored
-    renamed: Mapping[str, str] = {}  # paths of states by those that they had
-    structure: str = ''  # id of that which was stopped
-    rule: Optional[FailureRule] = None  # by which its failures were told, None: not known
 
     @property
     def age_s(self) -> float:

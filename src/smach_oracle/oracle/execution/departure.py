@@ -5,7 +5,7 @@ failure up to the one that goes on are left: those on the way end at once, and w
 is preempted, and waited for.
 """
 
-from typing import List, Optional, cast
+from typing import List, Optional, Tuple, cast
 
 import smach
 
@@ -37,9 +37,9 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
         return False
     departure = Departure(verdict, level, '{}/{}'.format(node.path, label))
     nodes = [*left_nodes, level]
-    others = _claim(nodes, departure)
+    others, leaving = _claim(nodes, departure)
     if others:
-        request_preempt(_container_apart(nodes, others))
+        request_preempt(_container_apart(nodes, others, leaving))
         _preempt_left_nodes(nodes[: -len(others)])
         return False
     smach.loginfo(
@@ -55,7 +55,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
 def _in_words(verdict: Verdict) -> str:
     if isinstance(verdict, JumpTo):
         return verdict.jump_path.entered_places[-1].path
-    return 'its end with {}'.format(verdict.ending.outcome if isinstance(verdict, GiveUp) else '')
+    return 'its end with {}'.format(cast(GiveUp, verdict).ending.outcome)
 
 
 def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
@@ -86,10 +86,10 @@ def _nodes_left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
     return []
 
 
-def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
+def _claim(nodes: List[TreeNode], departure: Departure) -> Tuple[List[TreeNode], Departure]:
     """Have containers left by a departure, and return from where on another one has come before.
 
-    Those below are then left by that other one.
+    Those below are then left by that other one, which is returned, too.
     """
     with departure.arrives_at.tree.departures_lock:
         first = next(
@@ -97,17 +97,19 @@ def _claim(nodes: List[TreeNode], departure: Departure) -> List[TreeNode]:
             len(nodes),
         )
         others = nodes[first:]
-        leaving = others[0].execution.departure if others else departure
+        leaving = cast(Departure, others[0].execution.departure) if others else departure
         for each in nodes[:first]:
             each.execution.depart_by(leaving)
     for each in nodes[1:first]:
         record = each.records.by_label.get(current_label_of(each.machine))
         if record is not None:
             record.retire_edges()  # its visit ends by no plain success
-    return others
+    return others, leaving
 
 
-def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[smach.State]:
+def _container_apart(
+    nodes: List[TreeNode], others: List[TreeNode], leaving: Departure
+) -> Optional[smach.State]:
     """Return the outermost container around a failure that another departure does not leave.
 
     What runs in it was preempted by that one, but may have gone on. None where it is the failed
@@ -115,15 +117,12 @@ def _container_apart(nodes: List[TreeNode], others: List[TreeNode]) -> Optional[
 
     :param others: the last ones of `nodes`, which the other departure leaves.
     """
-    inner = nodes[: -len(others)]
-    other = cast(Optional[Departure], others[0].execution.departure)
-    if not inner or other is None:
-        return None
     path = others[0].path
-    for label, link in zip(inner[-1].labels_from_parent, links_to(inner[-1])):
-        path = '{}/{}'.format(path, label)
-        if not other.failed_path.startswith(path + '/'):
-            return None if link.inner_container is nodes[0].machine else link.inner_container
+    for node in nodes[: -len(others)][-1:]:
+        for label, link in zip(node.labels_from_parent, links_to(node)):
+            path = '{}/{}'.format(path, label)
+            if not leaving.failed_path.startswith(path + '/'):
+                return None if link.inner_container is nodes[0].machine else link.inner_container
     return None
 
 

@@ -282,7 +282,7 @@ class Step:
             if ending.state is None:
                 node.execution.give_up()
             return self._end(failure, ending)
-        asked = node.tree.resumed.take_asked(node.records, record) if node.tree.is_resumed else None
+        asked = node.tree.resumed.take_asked(node.records, record)
         if asked is not None:
             return occasions.interrupted(failure, context, asked, continuous)
         if why_unwell:

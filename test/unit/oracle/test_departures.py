@@ -1,11 +1,12 @@
-"""A branch fails and is sent elsewhere where another branch has left the containers around it."""
+"""Containers that are left for a level above, also where another branch has left them before."""
 
 import os
 
 import pytest
 from guarded_machines import both, chain
-from machines import FakeExpert, Gate, Scripted, Watched, goto
+from machines import FakeExpert, Gate, Scripted, Watched, give_up, goto
 
+import smach
 from smach_oracle.oracle.records.events import EventKind
 
 UPSTREAM = bool(os.environ.get('SMACH_UPSTREAM'))
@@ -65,7 +66,12 @@ def test_what_has_gone_on_in_the_branch_is_preempted_again():
     )
     ends = {event.path: event.outcome for event in watched.of(EventKind.CONTAINER_END)}
     assert ends['TOP/BOTH/RIGHT/OTHER'] == 'preempted'
-    assert ('TOP/BOTH/RIGHT/OTHER', 'S') in preempts(watched)
+    assert preempts(watched) == [
+        ('TOP/BOTH/RIGHT/ONE', 'OBEYS'),
+        ('TOP/BOTH/RIGHT/ONE', 'ORACLE'),
+        ('TOP/BOTH/RIGHT/OTHER', 'OBEYS'),
+        ('TOP/BOTH/RIGHT/OTHER', 'S'),
+    ]
 
 
 def test_a_machine_that_fails_itself_gets_no_further_preempt():
@@ -83,3 +89,40 @@ def test_a_machine_around_what_fails_is_preempted():
     assert 'LAST' not in watched.visits()
     ends = {event.path: event.outcome for event in watched.of(EventKind.CONTAINER_END)}
     assert ends['TOP/BOTH/RIGHT'] == 'preempted'
+
+
+@pytest.mark.parametrize(
+    'answer, told',
+    [
+        (goto('A', container='TOP'), 'TOP/PICK is left for TOP/A'),
+        (give_up('done', container='TOP/PICK'), 'TOP/PICK/ARM is left for its end with done'),
+    ],
+    ids=['goto', 'give up'],
+)
+def test_the_log_says_for_what_a_container_is_left(answer, told, log):
+    machine = chain(A=Scripted(), PICK=chain(ARM=chain(GRASP=Scripted('aborted'))))
+    expert = FakeExpert(answer)
+    watched = Watched(machine, name='TOP', expert=expert, settings={'max_recoveries': 0})
+    assert watched.run() == 'done'
+    assert [text for _, text in log if ' is left for ' in text] == [told]
+
+
+def test_a_container_that_is_left_goes_no_way_that_it_went_before_with_the_same_outcome():
+    """It has no other one."""
+    pick = smach.StateMachine(outcomes=['done'])
+    with pick:
+        grasp = Scripted('ok', RuntimeError('slipped'), outcomes=('ok',))
+        smach.StateMachine.add('GRASP', grasp, {'ok': 'done'})
+    machine = smach.StateMachine(outcomes=['done', 'aborted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(outcomes=('ok',)), {'ok': 'PICK'})
+        smach.StateMachine.add('PICK', pick, {'done': 'CHECK'})
+        check = Scripted('again', 'ok', outcomes=('ok', 'again'))
+        smach.StateMachine.add('CHECK', check, {'ok': 'done', 'again': 'PICK'})
+    expert = FakeExpert(goto('A', container='TOP'))
+    watched = Watched(machine, name='TOP', expert=expert, settings={'max_recoveries': 0})
+    assert watched.run() == 'done'
+    assert [label for label in watched.visits() if label != 'GRASP'] == [
+        *('A', 'PICK', 'CHECK', 'PICK'),
+        *('A', 'PICK', 'CHECK'),
+    ]
