@@ -1,12 +1,15 @@
 """Users' objects are told apart by what they are, whatever their classes say."""
 
 import gc
+import sys
+import weakref
 
 import pytest
 
 from smach_oracle.oracle.identity import (
     WeakIdentityMap,
     attribute_of,
+    is_same,
     name_of,
     own_attributes,
     remove_identical,
@@ -66,11 +69,27 @@ def test_a_map_forgets_what_it_is_told_to_and_nothing_else(both):
 
 def test_an_entry_ends_with_its_object():
     found = WeakIdentityMap()
-    kept, gone = EqualToAll(), EqualToAll()
-    found[kept], found[gone] = 1, 2
-    del gone
+    kept, gone, value = EqualToAll(), EqualToAll(), EqualToAll()
+    found[kept], found[gone] = 1, value
+    with_it = weakref.ref(value)
+    del gone, value
     gc.collect()
     assert [each is kept for each in found] == [True]
+    assert with_it() is None
+
+
+def test_an_entry_that_is_dropped_while_all_are_gone_through_ends_quietly(monkeypatch):
+    raised = []
+    monkeypatch.setattr(sys, 'unraisablehook', raised.append)
+    found = WeakIdentityMap()
+    first, second = EqualToAll(), EqualToAll()
+    found[first], found[second] = 1, 2
+    each = iter(found)
+    assert next(each) is first
+    found.forget(first)
+    del first
+    assert next(each) is second
+    assert not raised and second in found
 
 
 def test_an_object_is_taken_out_of_a_list_once(both):
@@ -89,3 +108,50 @@ def test_what_a_class_refuses_to_say_is_nothing(both):
     assert attribute_of(both[0], 'missing') is None
     assert name_of(both[0]) == 'EqualToAll'
     assert name_of(two_equal_things) == 'two_equal_things'
+
+
+def test_plain_data_are_the_same_as_no_object_that_says_so():
+    assert is_same('cup', ''.join(('c', 'up'))) and is_same([1, {'a': 'b'}], [1, {'a': 'b'}])
+    assert not is_same('cup', EqualToAll()) and not is_same(EqualToAll(), 'cup')
+    assert not is_same(EqualToAll(), EqualToAll())
+
+
+class Arm:
+    """Two of them are two."""
+
+    def move(self):
+        """Do nothing."""
+
+    def stop(self):
+        """Do nothing either."""
+
+
+ARM, OTHER = Arm(), Arm()
+
+
+@pytest.mark.parametrize(
+    'one, other',
+    [
+        ([ARM], [ARM, ARM]),
+        ([ARM, ARM], [ARM]),
+        ([ARM, 1], [ARM, 2]),
+        ([ARM], (ARM,)),
+        ([ARM], [OTHER]),
+        ({'a': ARM}, {'a': ARM, 'b': 1}),
+        ({'a': ARM, 'b': 1}, {'a': ARM}),
+        ({'a': ARM}, {'b': ARM}),
+        ({'a': ARM}, {'a': OTHER}),
+        (ARM.move, OTHER.move),
+        (ARM.move, ARM.stop),
+        (ARM, OTHER),
+        (1, [1]),
+        ([], {}),
+    ],
+)
+def test_what_differs_somewhere_inside_is_not_the_same(one, other):
+    assert not is_same(one, other) and not is_same(other, one)
+
+
+@pytest.mark.parametrize('make', [lambda: [ARM, 'a'], lambda: (ARM, [1]), lambda: {'a': [ARM]}])
+def test_lists_and_mappings_of_the_same_are_the_same(make):
+    assert is_same(make(), make()) and is_same(ARM.move, ARM.move)

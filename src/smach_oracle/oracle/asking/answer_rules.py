@@ -78,11 +78,10 @@ def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
     is_beside = (answer.container, answer.state) in choices.states  # another branch
     if answer.container == choices.container and not is_beside:
         return answer._replace(container='')
-    is_told = answer.container or ('', answer.state) in choices.states
-    if is_told or answer.kind is not AnswerKind.GOTO:
+    if answer.container or answer.kind is not AnswerKind.GOTO:
         return answer
-    others = [path for path, label in choices.states if label == answer.state]
-    return answer._replace(container=others[0]) if len(others) == 1 else answer
+    found = [path for path, label in choices.states if label == answer.state]
+    return answer._replace(container=found[0]) if len(found) == 1 else answer
 
 
 def check_answer(answer: Answer, choices: AnswerChoices) -> None:
