@@ -11,7 +11,7 @@ import pytest
 from machines import Scripted, Watched, chain_of
 
 import smach
-from smach_oracle.oracle.records import folder_locks
+from smach_oracle.oracle.records import folder_locks, rates_file
 
 HERE = os.path.dirname(os.path.abspath(__file__))
 PROGRAM = """
@@ -77,6 +77,29 @@ def test_a_machine_that_lives_in_another_program_keeps_its_counts(tmp_path, prog
     with program('PICK', 3), program('PLACE', 1) as told:
         assert told == (0, 0, 0)
         assert (counts(tmp_path, 'PICK'), counts(tmp_path, 'PLACE')) == ((3, 3), (1, 1))
+
+
+def test_one_that_another_program_has_taken_over_meanwhile_has_its_rates(tmp_path, monkeypatch):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    Watched(chain_of(Scripted('aborted')), name='OLD', settings=settings).run()
+    gc.collect()
+    lock = rates_file.folder_lock
+
+    @contextlib.contextmanager
+    def locked(folder):
+        """The other program comes first: it has run once."""
+        monkeypatch.setattr(rates_file, 'folder_lock', lock)
+        monkeypatch.setattr(smach, 'loginfo', lambda text: None)
+        Watched(chain_of(Scripted('aborted')), name='NEW', settings=settings).run()
+        said.clear()
+        with lock(folder):
+            yield
+
+    said = []
+    monkeypatch.setattr(smach, 'logwarn', said.append)
+    monkeypatch.setattr(rates_file, 'folder_lock', locked)
+    machine = Watched(chain_of(Scripted()), name='NEW', settings=settings)
+    assert machine.rate('A').failures == 2 and not said
 
 
 def test_machines_that_live_in_one_program_keep_their_counts(tmp_path):

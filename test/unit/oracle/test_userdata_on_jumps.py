@@ -210,6 +210,15 @@ def test_what_a_precondition_removed_stays_removed():
     assert seen[1] == {}
 
 
+def test_what_a_precondition_removed_past_its_view_stays_removed():
+    machine = machine_of(
+        Scripted('aborted', **IO), [lambda ud: holder[0].userdata._data.pop('x') is not None]
+    )
+    holder = [machine.machine]
+    machine.run()
+    assert contents(machine.machine.userdata) == {}
+
+
 def test_what_the_expert_wrote_survives():
     expert = FakeExpert(goto('B', outputs={'x': 'by hand'}))
     _, seen = run([writes('x', 'half done', 'aborted')], expert=expert, max_recoveries=0)

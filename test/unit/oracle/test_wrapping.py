@@ -217,26 +217,39 @@ def test_a_machine_may_begin_at_any_other_state():
 
 
 @pytest.mark.parametrize(
-    'answer, told', [(supersede('ok'), 'ok'), (goto('B'), 'B'), (give_up('aborted'), 'aborted')]
+    'end, answer, to',
+    [
+        ('aborted', supersede('ok'), 'ok'),
+        ('aborted', goto('B'), 'B'),
+        ('aborted', give_up('done'), 'done'),
+        ('aborted', give_up(), 'aborted'),
+        ('odd', give_up(), 'B'),
+        ('aborted', give_up('done', container='SM_ROOT'), ''),
+        ('aborted', goto('IN', container='SM_ROOT'), ''),
+    ],
 )
-def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state(answer, told):
-    machine = watched(
-        Scripted('aborted'),
-        Scripted(),
-        expert=FakeExpert(answer),
-        settings={'states': {'A': {'prior': 1.0}}},
-    )
-    meta, seen = machine.machine.get_children()['ORACLE'], []
+def test_a_tool_that_hooks_the_execution_of_states_sees_that_of_the_meta_state(end, answer, to):
+    inner = smach.StateMachine(['done', 'aborted'])
+    with inner:
+        a = Scripted(end, outcomes=('ok', 'aborted', 'odd'))
+        smach.StateMachine.add('A', a, {'ok': 'done', 'odd': 'B'})
+        smach.StateMachine.add('B', Scripted(outcomes=('ok',)), {'ok': 'done'})
+    outer = smach.StateMachine(['done', 'aborted'])
+    with outer:
+        smach.StateMachine.add('IN', inner)
+    settings = {'author_recoveries': 'override', 'prior': 1.0, 'failure_outcomes': ['odd']}
+    machine = Watched(outer, expert=FakeExpert(answer), settings=settings)
+    meta, seen = inner.get_children()['ORACLE'], []
     execute = meta.execute
 
     def hooked(ud):
         outcome = execute(ud)
-        seen.append((ud is machine.machine.userdata, outcome))
+        seen.append((ud is inner.userdata, outcome))
         return outcome
 
     meta.execute = hooked
-    assert machine.run() == ('aborted' if told == 'aborted' else 'done')
-    assert seen == [(True, told)]
+    machine.run()
+    assert seen == [(True, to)]
 
 
 def test_the_meta_state_executes_for_a_failure_alone():

@@ -91,6 +91,13 @@ def test_what_was_not_stored_is_missing_or_as_the_script_gives_it(tmp_path):
         assert list(killed.diary.count('finds')) == [found]
 
 
+class WithoutLength:
+    """A user's own items."""
+
+    def __getitem__(self, index):
+        return [1, 2][index]
+
+
 def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     def iterated(items):
         diary = Diary(str(tmp_path / 'diary'))
@@ -99,13 +106,22 @@ def test_an_iterator_that_cannot_go_on_is_named_at_the_start(tmp_path, log):
     machine = smach.StateMachine(['succeeded', 'aborted'])
     machine.userdata.done = []
     with machine:
-        smach.StateMachine.add('LIST', iterated([1, 2]), {'succeeded': 'ONCE'})
-        smach.StateMachine.add('ONCE', iterated(iter([1, 2])), ENDS)
+        smach.StateMachine.add('LIST', iterated([1, 2]), {'succeeded': 'MADE'})
+        smach.StateMachine.add('MADE', iterated(lambda: iter([1, 2])), {'succeeded': 'ONCE'})
+        smach.StateMachine.add('ONCE', iterated(iter([1, 2])), {'succeeded': 'SET'})
+        smach.StateMachine.add('SET', iterated({1, 2}), {'succeeded': 'MAP'})
+        smach.StateMachine.add('MAP', iterated({1: 'a', 2: 'b'}), {'succeeded': 'NO_LENGTH'})
+        smach.StateMachine.add('NO_LENGTH', iterated(WithoutLength()), ENDS)
     OracleContainer.wrap(
         machine, name='TOP', settings={'checkpoint': str(tmp_path / 'robot.db')}
     ).execute()
     named = [text for level, text in log if level == 'warn' and 'begins again' in text]
-    assert len(named) == 1 and named[0].startswith('TOP/ONCE: begins again with its first item')
+    assert [text.split(': begins again with its first item')[0] for text in named] == [
+        'TOP/ONCE',
+        'TOP/SET',
+        'TOP/MAP',
+        'TOP/NO_LENGTH',
+    ]
 
 
 def test_an_iterator_that_cannot_go_on_begins_with_its_first_item_again(tmp_path):

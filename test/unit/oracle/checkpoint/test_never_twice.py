@@ -281,6 +281,13 @@ def test_the_option_repeat_has_it_repeated_once(tmp_path, more):
     assert killed.diary.count('begins')['POUR'] == 2
 
 
+def test_with_a_machine_all_that_is_in_it_may_be_repeated_once(tmp_path):
+    killed = killed_in(tmp_path / 'killed', NESTED, 'CARRY', **NEVER)
+    told = killed.run(resume_repeat=['KITCHEN'], on_resume='state:KITCHEN')
+    assert told['outcome'] == 'succeeded'
+    assert killed.diary.count('begins')['POUR'] == 2
+
+
 def test_the_trial_is_kept_where_nobody_says_whether_it_may_be_repeated(tmp_path):
     killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
     told = killed.run(on_resume='state:POUR')

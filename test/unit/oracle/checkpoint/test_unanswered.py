@@ -266,6 +266,18 @@ def test_in_one_process_a_kept_trial_goes_on_and_a_dropped_one_leaves_nothing(tm
         assert set(ALL) == set(killed.diary.count('ends'))
 
 
+def test_a_trial_whose_minutes_are_over_is_kept_and_nobody_is_asked(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
+    killed.run(kill_at=30)
+    asked = tmp_path / 'asked'
+    asked.write_text('')
+    told = killed.run(expert=Answers(asked, same_state), budget={'minutes': 1e-9})
+    assert (told['outcome'], told['ended_by']) == (None, 'kept')
+    assert not questions(asked)
+    assert any("the trial's 1e-09 minutes are over" in line for line in told['log'])
+    assert killed.run(expert=Answers(asked, same_state))['outcome'] == 'succeeded'
+
+
 def test_a_failure_of_a_concurrence_whose_branches_had_ended_is_asked_about(tmp_path):
     def both(diary, points):
         inner = smach.Concurrence(
