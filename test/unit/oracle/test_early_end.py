@@ -27,3 +27,16 @@ def test_a_process_that_goes_down_ends_a_stored_trial_before_its_machines_know()
         early.note_shutdown()
         assert early.why is None, 'no question is open'
         assert early.end_at_shutdown() is is_stored
+
+
+def test_once_no_question_is_open_a_process_that_goes_down_ends_nothing_early():
+    early_end = EarlyEnd(Scope())
+    early_end.begin_trial(is_stored=True)
+    with early_end.asking(), early_end.asking():
+        assert early_end.is_near()
+    assert not early_end.is_near()
+    early_end.note_shutdown()
+    assert early_end.why is None
+    with early_end.asking():
+        early_end.note_end_of_state()
+    assert early_end.why is TrialEnd.SHUTDOWN and early_end.is_near()

@@ -70,6 +70,7 @@ def test_the_rule_goes_along_with_rates_under_a_new_name(tmp_path, log):
     watched(Scripted(), name='OTHER', settings=settings)  # it has not run yet
     assert rules(path)['ONE'] == rules(path)['OTHER'] == BY_NAME
     assert not said(log) and not said(log, 'info')
+    assert any(each == 'warn' and 'with what ONE has learned. It' in text for each, text in log)
 
 
 def test_rules_that_make_no_sense_cost_nothing(tmp_path, log):
