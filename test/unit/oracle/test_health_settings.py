@@ -51,6 +51,7 @@ def healthy(given, resolver=None):
             {'diagnostics': '/Power System'},
             HealthCondition(HealthKind.DIAGNOSTICS, 'Power System', '/Power System'),
         ),
+        ({'diagnostics': '/'}, HealthCondition(HealthKind.DIAGNOSTICS, '/', '/')),
         (
             {'diagnostics': 'Power', 'worst': 'ok', 'max_age_s': 2, 'name': 'power'},
             HealthCondition(HealthKind.DIAGNOSTICS, 'power', 'Power', worst='ok', max_age_s=2.0),

@@ -354,3 +354,17 @@ def test_data_of_a_file_become_plain_numbers():
     read = plain({'a': [whole], 'b': part})
     assert read == {'a': [16], 'b': 0.5}
     assert [type(read['a'][0]), type(read['b'])] == [int, float]
+
+
+@pytest.mark.parametrize(
+    'text, told',
+    [
+        ('', "robot.yaml: rates.memory: 'x' is no number; allowed: a number, or none"),
+        ('all is wrong', 'robot.yaml: all is wrong'),
+    ],
+)
+def test_an_error_says_the_same_under_another_key_and_of_a_file(text, told):
+    error = SettingsError('memory', 'x', 'a number', text, 'is no number')
+    error = error.called('rates.memory').set_at('robot.yaml').allowing(', or none')
+    assert (str(error), error.key) == (told, 'robot.yaml: rates.memory')
+    assert (error.value, error.allowed) == ('x', 'a number, or none')

@@ -164,6 +164,15 @@ def _of_streaks(rng: random.Random) -> Iterator[str]:
             again.take_over(streaks.told())
             streaks = again
         yield '{} {}'.format(streaks.told(), [each.so_far(90.0) for each in streaks.values()])
+    told: Any = dict(streaks.told())
+    label, right = rng.choice(sorted(told) or ['A']), [1, 2.0, ['A'], ['again'], 3, '']
+    wrong = (None, 3, [], ['x'] * 6, [0, 0.0, 3, [], 0], [0, 0.0, [], [], 'x'])
+    given = rng.choice((right, rng.choice(wrong)))
+    try:
+        streaks.take_over(rng.choice(({**told, label: given}, {label: given}, given)))
+    except ValueError as err:
+        yield str(err).partition(':')[0]
+    yield str(streaks.told())
 
 
 # -- facts of events

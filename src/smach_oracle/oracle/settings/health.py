@@ -105,7 +105,7 @@ def _topic(prefix: str, entry: Mapping[str, object]) -> HealthCondition:
         raise SettingsError(
             prefix + 'field', field, 'a field of the message, such as data or status.level'
         )
-    made = HealthCondition(HealthKind.TOPIC, topic.strip('/') or topic, topic, field)
+    made = HealthCondition(HealthKind.TOPIC, topic.strip('/'), topic, field)
     return _wanted(prefix, entry, made)
 
 
