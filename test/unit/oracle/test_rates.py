@@ -428,6 +428,28 @@ def test_a_record_that_a_reader_of_rates_makes_too_late_replaces_none(monkeypatc
     assert [row.successes for row in wrapped.rates()] == [1]
 
 
+def test_rates_that_are_read_while_a_record_is_made_are_known_to_it(tmp_path, monkeypatch):
+    from smach_oracle.oracle.machine import container_records
+
+    path, before = str(tmp_path / 'rates.json'), watched(Scripted('aborted', 'ok', 'aborted'))
+    before.run()
+    before.machine.save_rates(path)
+    wrapped = OracleContainer.wrap(chain_of(Scripted()))
+    wrapped.load_rates(path)
+    base_of, read = container_records.base_of, []
+
+    def reads_again(learned):
+        if not read:  # another thread does
+            read.append(before.run())
+            before.machine.save_rates(path)
+            wrapped.load_rates(path)
+        return base_of(learned)
+
+    monkeypatch.setattr(container_records, 'base_of', reads_again)
+    assert [row.failures for row in wrapped.rates()] == [2]
+    assert read == ['done']
+
+
 def test_recoveries_of_a_nested_machine_are_those_of_the_present_trial():
     import smach
 
