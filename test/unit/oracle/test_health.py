@@ -433,3 +433,25 @@ def test_a_state_that_runs_while_the_robot_is_unwell_is_not_disturbed(health):
     gate.go.set()
     assert run.result() == 'done'
     assert health.asked == 0
+
+
+def test_who_fails_while_another_branch_waits_for_a_well_robot_waits_too(health, log):
+    waiting = threading.Event()
+    split = smach.Concurrence(
+        outcomes=['done', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'done': {'LEFT': 'done', 'RIGHT': 'done'}},
+    )
+    with split:
+        smach.Concurrence.add('LEFT', chain_of(Scripted(fails_unwell(health))))
+        later = Scripted(lambda state, ud: 'aborted' if waiting.wait(10) else 'ok')
+        smach.Concurrence.add('RIGHT', chain_of(later))
+    machine = Watched(chain_of(split), health=health, settings=SETTINGS)
+    machine.machine.events.observers.append(
+        lambda event: waiting.set() if event.kind is EventKind.HEALTH_WAIT_START else None
+    )
+    run = in_thread(machine.run)
+    assert wait_for(lambda: [text for _, text in log if text.endswith('; it waits, too')], 10)
+    health.now = ''
+    assert run.result() == 'done' and not machine.of(EventKind.FAILURE)
+    assert later.runs == 2
