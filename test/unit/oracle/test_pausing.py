@@ -77,6 +77,8 @@ def test_a_step_enters_one_state_and_waits_again() -> None:
             eventually(lambda state=state: state.runs == 1)
         assert held.end() == 'done'
     assert held.told(EventKind.HOLD_END) == ['stepped'] * 3
+    waited_s = [event.data['waited_s'] for event in held.of(EventKind.HOLD_END)]
+    assert waited_s == [round(each, 3) for each in waited_s], 'in milliseconds'
 
 
 def test_a_step_of_a_machine_that_runs_pauses_it() -> None:
