@@ -375,3 +375,14 @@ def test_of_several_threads_none_takes_more_than_a_policy_makes_do_with():
         "the trial's 2 attempts are spent",
     ]
     assert budget.recoveries == 2
+
+
+def test_the_usual_time_is_the_median_of_the_latest_twenty_trials():
+    clock = FakeClock()
+    budget = TrialBudget(clock)
+    assert budget.usual_minutes is None
+    for minutes in [3] * 11 + [1] * 10:
+        budget.begin(Budget())
+        clock.advance(60.0 * minutes)
+        budget.end()
+    assert budget.usual_minutes == pytest.approx(2.0)
