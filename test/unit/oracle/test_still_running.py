@@ -347,31 +347,6 @@ def test_a_preempt_or_a_shutdown_goes_before_an_answer(stop, monkeypatch):
     assert [event.target for event in machine.of(EventKind.TRANSITION)] == ['ORACLE', 'preempted']
 
 
-def test_a_preempt_on_the_way_to_the_oracle_goes_before_an_answer():
-    def preempt(event):
-        if event.kind is EventKind.TRANSITION and event.target == 'ORACLE':
-            if event.outcome == 'preempted':
-                machine.machine.request_preempt()
-
-    expert = FakeExpert(goto('B', outputs={'box': 'whole'}))
-    machine = asked(Scripted('aborted', Gate(), output_keys=['box']), Scripted(), expert=expert)
-    machine.machine.events.observers.append(preempt)
-    assert machine.run() == 'preempted' and machine.visits() == ['A', 'A']
-    assert 'box' not in machine.machine.userdata
-
-
-def test_a_state_that_is_answered_and_then_taken_away_is_an_error():
-    def take_away(state, ud):
-        ended = Gate()(state, ud)
-        for table in (machine.machine._states, machine.machine._transitions):
-            del table['B']
-        return ended
-
-    machine = asked(Scripted('aborted', take_away), Scripted(), expert=FakeExpert(goto('B')))
-    with pytest.raises(smach.InvalidStateError, match='there is no way to SM_ROOT/B'):
-        machine.run()
-
-
 def both_branches(*scripts):
     both = smach.Concurrence(
         outcomes=['done', 'aborted'],

@@ -8,6 +8,7 @@ from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, su
 from test_still_running import asked, told
 from waiting import wait_for
 
+import smach
 from smach_oracle.oracle.machine import places
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 from smach_oracle.oracle.recovery.still_running import WatchedVisit
@@ -176,3 +177,28 @@ def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatc
         'cannot go to B, as was answered: B still runs'
     ]
     assert expert.questions[1].text == 'was taken out while it still ran'
+
+
+def test_a_preempt_on_the_way_to_the_oracle_goes_before_an_answer():
+    def preempt(event):
+        if event.kind is EventKind.TRANSITION and event.target == 'ORACLE':
+            if event.outcome == 'preempted':
+                machine.machine.request_preempt()
+
+    expert = FakeExpert(goto('B', outputs={'box': 'whole'}))
+    machine = asked(Scripted('aborted', Gate(), output_keys=['box']), Scripted(), expert=expert)
+    machine.machine.events.observers.append(preempt)
+    assert machine.run() == 'preempted' and machine.visits() == ['A', 'A']
+    assert 'box' not in machine.machine.userdata
+
+
+def test_a_state_that_is_answered_and_then_taken_away_is_an_error():
+    def take_away(state, ud):
+        ended = Gate()(state, ud)
+        for table in (machine.machine._states, machine.machine._transitions):
+            del table['B']
+        return ended
+
+    machine = asked(Scripted('aborted', take_away), Scripted(), expert=FakeExpert(goto('B')))
+    with pytest.raises(smach.InvalidStateError, match='there is no way to SM_ROOT/B'):
+        machine.run()
