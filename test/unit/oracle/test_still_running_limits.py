@@ -179,19 +179,6 @@ def test_a_state_that_has_closed_meanwhile_is_refused_and_asked_again(monkeypatc
     assert expert.questions[1].text == 'was taken out while it still ran'
 
 
-def test_a_preempt_on_the_way_to_the_oracle_goes_before_an_answer():
-    def preempt(event):
-        if event.kind is EventKind.TRANSITION and event.target == 'ORACLE':
-            if event.outcome == 'preempted':
-                machine.machine.request_preempt()
-
-    expert = FakeExpert(goto('B', outputs={'box': 'whole'}))
-    machine = asked(Scripted('aborted', Gate(), output_keys=['box']), Scripted(), expert=expert)
-    machine.machine.events.observers.append(preempt)
-    assert machine.run() == 'preempted' and machine.visits() == ['A', 'A']
-    assert 'box' not in machine.machine.userdata
-
-
 def test_a_state_that_is_answered_and_then_taken_away_is_an_error():
     def take_away(state, ud):
         ended = Gate()(state, ud)
