@@ -7,7 +7,7 @@ raise there. A machine, a state, a function or a message is itself, and equal to
 import inspect
 import types
 import weakref
-from typing import Dict, Generic, Iterator, List, Optional, Sequence, Tuple, TypeVar, cast
+from typing import Dict, Generic, Iterator, List, Optional, Tuple, TypeVar
 
 Key = TypeVar('Key')
 Value = TypeVar('Value')
@@ -80,16 +80,13 @@ def is_same(one: object, other: object) -> bool:
         return one == other
     if type(one) is not type(other):
         return False
-    if isinstance(one, types.MethodType):
-        method = cast(types.MethodType, other)
-        return one.__self__ is method.__self__ and one.__func__ is method.__func__
-    if isinstance(one, (list, tuple)):
-        items = cast(Sequence[object], other)
-        return len(one) == len(items) and all(map(is_same, one, items))
-    if isinstance(one, dict):
-        values = cast(Dict[object, object], other)
-        return len(one) == len(values) and all(
-            key in values and is_same(value, values[key]) for key, value in one.items()
+    if isinstance(one, types.MethodType) and isinstance(other, types.MethodType):
+        return one.__self__ is other.__self__ and one.__func__ is other.__func__
+    if isinstance(one, (list, tuple)) and isinstance(other, (list, tuple)):
+        return len(one) == len(other) and all(map(is_same, one, other))
+    if isinstance(one, dict) and isinstance(other, dict):
+        return len(one) == len(other) and all(
+            key in other and is_same(value, other[key]) for key, value in one.items()
         )
     return False
 

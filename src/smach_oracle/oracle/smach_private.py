@@ -1,9 +1,9 @@
 """SMACH's private names: the one file of the executive that uses them on another object.
 
 Upstream's engine and our own have the same names, which public scripts and tools use too. Where
-they differ, the docstring says so. A class of ours that extends one of SMACH's reads its own by
-`self`. What only reads a name is an `attrgetter`: that costs half of a function of ours, and the
-short way of a plain success calls two.
+they differ, a docstring says so. A class of ours that extends one of SMACH's reads its own by
+`self`. Most of what only reads a name is an `attrgetter`: that costs half of a function of ours,
+and the short way of a plain success calls two.
 """
 
 import threading
@@ -226,31 +226,39 @@ def remapping_of(container: object, label: str) -> Mapping[str, str]:
 class ClassSteps(NamedTuple):
     """The way in which the machines of a class step.
 
-    `once`: what the class does for a step. `is_asked`: whether it answers itself whether there is
-    a preempt request. `tells_transitions`: whether it wants every transition told. `is_smachs`:
-    whether nobody but SMACH and this package has a say in it.
+    `cls`: the class, which is kept. `once`: what it does for a step. `is_asked`: whether it answers
+    itself whether there is a preempt request. `tells_transitions`: whether it wants every
+    transition told. `is_smachs`: whether nobody but SMACH and this package has a say in it.
     """
 
+    cls: type
     once: object
     is_asked: bool
     tells_transitions: bool
     is_smachs: bool
 
 
-class KnownClasses(Dict[type, ClassSteps]):
-    """The way in which machines step, by class, looked up once in a trial: it may be patched."""
+class KnownClasses(Dict[int, ClassSteps]):
+    """The way in which machines step, by the id of their class.
 
-    def __missing__(self, cls: Any) -> ClassSteps:
-        steps = self[cls] = ClassSteps(
-            getattr(cls, '_update_once', None),
-            cls.preempt_requested is not smach.State.preempt_requested,
-            cls.call_transition_cbs is not smach.Container.call_transition_cbs,
-            all(
-                each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
-                for each in cls.__mro__
-                if 'execute' in vars(each) or '_update_once' in vars(each)
-            ),
-        )
+    It is looked up once in a trial, as a user may patch a class between two trials.
+    """
+
+    def steps_of(self, cls: Any) -> ClassSteps:
+        """Return that of a class. What a user's metaclass says of equality does not matter."""
+        steps = self.get(id(cls))
+        if steps is None:
+            steps = self[id(cls)] = ClassSteps(
+                cls,
+                getattr(cls, '_update_once', None),
+                cls.preempt_requested is not smach.State.preempt_requested,
+                cls.call_transition_cbs is not smach.Container.call_transition_cbs,
+                all(
+                    each.__module__.partition('.')[0] in ('smach', 'smach_oracle')
+                    for each in cls.__mro__
+                    if 'execute' in vars(each) or '_update_once' in vars(each)
+                ),
+            )
         return steps
 
 
@@ -293,7 +301,7 @@ class EngineProbe:
         # of a re-entrant lock
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
-        steps = classes[type(machine)]
+        steps = classes.steps_of(type(machine))
         self.tells_transitions = steps.tells_transitions
         self.stays_attentive = stays_attentive or steps.is_asked
         step = getattr(machine, '_update_once', None)

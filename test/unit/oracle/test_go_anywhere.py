@@ -59,12 +59,12 @@ def jumps(watched):
     ]
 
 
-def test_up_to_a_state_of_a_level_above(log):
+def test_up_to_a_state_of_a_level_above():
     machine = chain(A=Scripted(), PICK=chain(ARM=chain(GRASP=Scripted('aborted'))), C=Scripted())
     watched, _, outcome = run(machine, to('TOP', 'A'))
-    assert outcome == 'done' and watched.visits() == ['A', 'PICK', 'ARM', 'GRASP'] * 2 + ['C']
+    assert outcome == 'done'
+    assert watched.visits() == ['A', 'PICK', 'ARM', 'GRASP', 'A', 'PICK', 'ARM', 'GRASP', 'C']
     assert jumps(watched) == [('TOP', 'PICK', 'A', 'TOP/PICK/ARM/GRASP', None)]
-    assert ('info', 'TOP/PICK is left for TOP/A') in log
 
 
 def test_a_container_that_is_left_counts_with_the_outcome_that_it_had():
@@ -372,14 +372,13 @@ def test_down_into_an_iterator_the_place_is_of_its_first_item_alone():
     assert watched.visits() == ['ALL', 'B', 'D', 'B', 'D', 'C', 'ALL', 'D', 'B', 'D', 'C']
 
 
-def test_a_level_above_may_be_given_up(log):
+def test_a_level_above_may_be_given_up():
     machine = chain(A=Scripted(), MIDDLE=chain(PICK=chain(GRASP=Scripted('aborted'))), C=Scripted())
     watched, expert, outcome = run(machine, give_up('done', container='TOP/MIDDLE'))
     assert outcome == 'done'
     assert watched.visits() == ['A', 'MIDDLE', 'PICK', 'GRASP', 'C']
     (given_up,) = watched.of(EventKind.GIVE_UP)
     assert (given_up.path, given_up.state, given_up.outcome) == ('TOP/MIDDLE', 'PICK', 'done')
-    assert ('info', 'TOP/MIDDLE/PICK is left for its end with done') in log
     watched, expert, outcome = run(
         chain(MIDDLE=chain(PICK=chain(GRASP=Scripted('aborted')))),
         give_up('aborted', container='TOP'),

@@ -116,6 +116,25 @@ def test_of_two_machines_that_compare_equal_each_is_its_own_key():
     assert list(kept) == []
 
 
+def test_a_class_of_machines_may_compare_by_its_own_rules():
+    class Alike(type):
+        def __eq__(cls, other):
+            return True
+
+        __hash__ = None
+
+    class Own(smach.StateMachine, metaclass=Alike):
+        pass
+
+    outcomes = ['done', 'aborted', 'preempted']
+    inner, machine = Own(outcomes), Own(outcomes)
+    with inner:
+        smach.StateMachine.add('A', Scripted(), {'ok': 'done'})
+    with machine:
+        smach.StateMachine.add('INNER', inner)
+    assert OracleContainer.wrap(machine).execute() == 'done'
+
+
 def test_a_method_is_the_same_at_each_access_and_an_equal_object_is_not():
     class Robot:
         def __eq__(self, other):

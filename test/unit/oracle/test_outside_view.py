@@ -132,12 +132,13 @@ def test_what_cannot_be_wrapped_stays_bare():
 @pytest.mark.parametrize('nested, has', [(True, True), (False, False), (['OTHER'], False)])
 def test_what_is_nested_in_a_machine_that_is_built_has_an_oracle_as_the_setting_says(nested, has):
     built = OracleContainer(['done', 'aborted', 'preempted'], settings={'nested': nested})
-    inner = chain_of(Scripted())
+    inner, other = chain_of(Scripted()), chain_of(Scripted())
     with built:
         smach.StateMachine.add('INNER', inner)
-        smach.StateMachine.add('OTHER', chain_of(Scripted()))
+        smach.StateMachine.add('OTHER', other)
     assert built.execute() == 'done'
     assert ('ORACLE' in inner.get_children()) is has
+    assert ('ORACLE' in other.get_children()) is bool(nested)
 
 
 @pytest.mark.parametrize('strict', [True, False])

@@ -263,6 +263,18 @@ def test_none_is_run_in_a_machine_that_is_not_executed():
     assert ends(watched)[0][3:] == ('not met', "'SEE/LOOK' cannot be run: there is no such state")
 
 
+def test_none_is_run_in_a_machine_of_two_containers_that_the_other_one_holds():
+    """A script executes the second of them by itself."""
+    shared = chain(LOOK=Scripted())
+    pick = chain(GRASP=Scripted('aborted'), SEE=shared)
+    watched = wrapped(chain(FIRST=chain(SEE=shared), PICK=pick), 'GRASP', 'FIRST/SEE/LOOK')
+    assert pick.execute() == 'done'
+    assert ends(watched)[-1][3:] == (
+        'not met',
+        'TOP/FIRST/SEE/LOOK is in no container that is being executed',
+    )
+
+
 def test_a_state_that_is_not_repeated_by_itself_is_not_met():
     pour = Scripted()
     watched = wrapped(

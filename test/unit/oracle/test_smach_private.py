@@ -43,9 +43,13 @@ def can_read(getter, thing):
 
 
 def unread():
-    """The getters that cannot read what their types say, each kind of it."""
-    found = set()
-    for name, kind in vars(smach_private)['__annotations__'].items():
+    """Names of getters that can read no example of a type that they take, or say none."""
+    getters = {
+        name for name, each in vars(smach_private).items() if isinstance(each, operator.attrgetter)
+    }
+    kinds = smach_private.__annotations__
+    found = getters.difference(kinds)
+    for name, kind in kinds.items():
         (given,), _ = typing.get_args(kind)
         for each in typing.get_args(given) or (object if given is typing.Any else given,):
             examples = [thing for thing in THINGS.values() if isinstance(thing, each)]

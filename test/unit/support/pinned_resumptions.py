@@ -240,9 +240,7 @@ def earlier_moment(plan: TreePlan, chance: random.Random, store: StoreFile) -> L
     """From any moment, in the same script or with other names."""
     later = Later(plan) if chance.random() < 0.6 else other_names(plan, chance, store)
     moments = store.moments(store.trials()[-1].number)
-    return later._replace(
-        settings=dict(later.settings, resume_from=chance.choice(moments).number)
-    )
+    return later._replace(settings=dict(later.settings, resume_from=chance.choice(moments).number))
 
 
 def killed_again(plan: TreePlan, chance: random.Random, store: StoreFile) -> Later:

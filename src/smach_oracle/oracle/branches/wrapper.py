@@ -225,7 +225,7 @@ def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
         container = children_of(container).get(label)
         path = '{}/{}'.format(path, label)
         wrapper = wrapper_of(container)
-        if wrapper is not None:  # the last one may be the container of the node itself
+        if wrapper is not None:  # the last label of a nested machine is its own
             found.append((path, wrapper))
     return found
 

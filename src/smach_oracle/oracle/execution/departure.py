@@ -87,9 +87,10 @@ def _nodes_left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
 
 
 def _claim(nodes: List[TreeNode], departure: Departure) -> Tuple[List[TreeNode], Departure]:
-    """Have containers left by a departure, and return from where on another one has come before.
+    """Have containers left by a departure.
 
-    Those below are then left by that other one, which is returned, too.
+    Return those that another one leaves, which has come before, and by which departure the others
+    are left.
     """
     with departure.arrives_at.tree.departures_lock:
         first = next(
@@ -117,12 +118,13 @@ def _container_apart(
 
     :param others: the last ones of `nodes`, which the other departure leaves.
     """
-    path = others[0].path
-    for node in nodes[: -len(others)][-1:]:
-        for label, link in zip(node.labels_from_parent, links_to(node)):
-            path = '{}/{}'.format(path, label)
-            if not leaving.failed_path.startswith(path + '/'):
-                return None if link.inner_container is nodes[0].machine else link.inner_container
+    if len(others) == len(nodes):
+        return None
+    path, below = others[0].path, nodes[-len(others) - 1]
+    for label, link in zip(below.labels_from_parent, links_to(below)):
+        path = '{}/{}'.format(path, label)
+        if not leaving.failed_path.startswith(path + '/'):
+            return None if link.inner_container is nodes[0].machine else link.inner_container
     return None
 
 

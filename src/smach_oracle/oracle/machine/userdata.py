@@ -303,9 +303,10 @@ class StateView:
     """A state's view of the userdata, kept for its next visit where that is safe.
 
     This engine and the state's class decide that. It may be used again while nothing that it was
-    made of has been exchanged: the machine looks at each visit.
+    made of has been exchanged, and the state has the same keys: the machine looks at each visit.
 
-    `state`: None where it is made for one visit. `keys`: those of the state, in and out.
+    `state`: None where it is made for one visit. `keys`, which it then has not: those of the state,
+    in and out.
     """
 
     __slots__ = ('state', 'userdata', 'remapping', 'keys', 'remapper')

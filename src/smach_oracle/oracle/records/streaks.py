@@ -53,7 +53,7 @@ class Streaks(Dict[str, OpenStreak]):
 
     def end_execution(self) -> None:
         """End all, but where a way has ended the execution."""
-        if self:  # seldom
+        if self:  # most executions have none
             for label in [label for label, each in self.items() if not each.leaves]:
                 del self[label]
 

@@ -364,9 +364,12 @@ class OracleState(smach.State):
         if recovery is None:
             raise TrialError('the meta state is entered by failures alone')
         try:
-            verdicts = (phase(recovery) for phase in PHASES)
-            self._verdict = verdict = next(each for each in verdicts if each is not None)
-            return leads_to(verdict)
+            for phase in PHASES:
+                verdict = phase(recovery)
+                if verdict is not None:
+                    self._verdict = verdict
+                    return leads_to(verdict)
+            raise TrialError('no phase of the recovery has come to a verdict')
         finally:
             with self._lock:
                 self._recovery = None

@@ -209,8 +209,9 @@ class _Elsewhere:
 
     def __init__(self, recovery: Recovery, place: TreePlace) -> None:
         """:raises NotMet: where the state cannot be run now."""
-        # the place was found from here, so a way leads there
-        way = cast(JumpPath, jump_path_to(recovery.node, place))
+        way = jump_path_to(recovery.node, place)
+        if way is None:  # its machine lies in two containers, and the other one has adopted it
+            raise NotMet('{} is in no container that is being executed'.format(place.path))
         _check(way)
         self._own = recovery.watch.gate
         self._userdata = recovery.node.machine.userdata
