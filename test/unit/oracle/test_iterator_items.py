@@ -120,11 +120,12 @@ def test_an_expert_hands_over_what_the_item_would_have_written():
     assert machine.machine.userdata.done == ['by hand', 3, 4]
 
 
-def test_a_failing_outcome_among_the_loop_outcomes_goes_on_and_says_which_item_is_passed_over(log):
+@pytest.mark.parametrize(
+    'loops', [{'loop_outcomes': ['ok', 'aborted']}, {'break_outcomes': ['preempted']}]
+)
+def test_a_failing_outcome_that_loops_goes_on_and_says_which_item_is_passed_over(log, loops):
     each = Item(item2=['aborted'])
-    machine = watched(
-        iterator_over(each, loop_outcomes=['ok', 'aborted']), expert=FakeExpert(), settings=ASKS
-    )
+    machine = watched(iterator_over(each, **loops), expert=FakeExpert(), settings=ASKS)
     assert machine.run() == 'done'
     assert each.tried == [1, 2, 3, 4]
     assert not machine.of(EventKind.DECISION)
