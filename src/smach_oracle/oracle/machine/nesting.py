@@ -54,6 +54,8 @@ def machines_below(
 
 def nodes_in(state: smach.State) -> List[TreeNode]:
     """Return the outermost wrapped machines of a state, which may be one itself."""
+    if not isinstance(state, smach.Container):  # most are none: it is asked at each failure
+        return []
     if isinstance(state, smach.StateMachine):
         machines = [state]
     else:

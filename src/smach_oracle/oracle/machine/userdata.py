@@ -329,8 +329,8 @@ class StateView:
 def _has_plain_keys(state: smach.State) -> bool:
     """Whether the state declares its keys as `smach.State` does, in sets."""
     methods = ('get_registered_input_keys', 'get_registered_output_keys')
-    return isinstance(state, smach.State) and all(
-        getattr(getattr(state, name), '__func__', None) is getattr(smach.State, name)
+    return all(
+        getattr(getattr(state, name, None), '__func__', None) is getattr(smach.State, name)
         for name in methods
     )
 

@@ -109,7 +109,7 @@ def judge(
     if isinstance(judged, Route):
         return judged
     items = items_under_way(node)
-    return judged._replace(text='; '.join(filter(None, (judged.text, items))))
+    return judged._replace(text='; '.join(filter(None, (judged.text, items)))) if items else judged
 
 
 def _judge(
