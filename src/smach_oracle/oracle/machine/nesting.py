@@ -54,7 +54,7 @@ def machines_below(
 
 def nodes_in(state: smach.State) -> List[TreeNode]:
     """Return the outermost wrapped machines of a state, which may be one itself."""
-    if not isinstance(state, smach.Container):  # most are none: it is asked at each failure
+    if not isinstance(state, smach.Container):  # as most states: each failure asks
         return []
     if isinstance(state, smach.StateMachine):
         machines = [state]
