@@ -9,7 +9,8 @@ import smach
 from ..machine import nesting
 from ..machine.execution import why_no_outcome
 from ..machine.items import TrackedItems
-from ..machine.nesting import branching_below, children_of
+from ..machine.nesting import branching_below
+from ..machine.places import links_to
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
@@ -219,12 +220,10 @@ def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
     """Return them, each with its path, the outermost first."""
     if node.parent is None or not node.runs_in_branch:
         return []
-    container: object = node.parent.machine
     path, found = node.parent.key, []
-    for label in node.labels_from_parent:
-        container = children_of(container).get(label)
-        path = '{}/{}'.format(path, label)
-        wrapper = wrapper_of(container)
+    for link in links_to(node):
+        path = '{}/{}'.format(path, link.label)
+        wrapper = wrapper_of(link.inner_container)
         if wrapper is not None:  # the last label of a nested machine is its own
             found.append((path, wrapper))
     return found
