@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import random
 import re
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from smach_oracle.oracle.records.events import EventKind, FailureKind
 FOLDER = Path(__file__).resolve().parents[2] / 'data/pinned'
 SECONDS = re.compile(r'(?:under )?\d+(?:\.\d+)?(?:e-\d+)? s\b')
 ADDRESS = re.compile(r' at 0x[0-9a-f]+')
+NUMBER = re.compile(r'-?\d+\.\d+(?:e-?\d+)?')
 # settings are held elsewhere, and how long something took is never the same
 NOT_HELD = ('settings', 'failure_rule', 'origin', 'inputs')
 
@@ -17,6 +19,28 @@ NOT_HELD = ('settings', 'failure_rule', 'origin', 'inputs')
 def held(name):
     """The lines of a file."""
     return (FOLDER / (name + '.txt')).read_text('utf-8').splitlines()
+
+
+def rounded(text):
+    """A text with three digits of each number behind its point."""
+    return NUMBER.sub(lambda found: '{:.3f}'.format(float(found.group())), text)
+
+
+def drawn(groups, draws):
+    """Lines of so many draws each, by what they are about and a number.
+
+    `groups`: what it is, how many numbers, and a function of a generator of random numbers that
+    yields the lines of one draw.
+    """
+    return {
+        '{} {}'.format(what, number): [
+            rounded('{}: {}'.format(seed, line))
+            for seed in range(number * draws, (number + 1) * draws)
+            for line in lines_of(random.Random('{} {}'.format(what, seed)))
+        ]
+        for what, numbers, lines_of in groups
+        for number in range(numbers)
+    }
 
 
 def digest_of(lines):

@@ -16,8 +16,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import write_told
-from pinned_trees import rounded
+from pinned import drawn, write_told
 
 from smach_oracle.oracle.decision.failure_rate import (
     ESTIMATORS,
@@ -57,8 +56,6 @@ from smach_oracle.oracle.decision.ways import (
     way_in_words,
 )
 
-EACH = 40  # draws under one digest
-SITUATIONS, RATES, SENTENCES = 12, 6, 2  # digests
 # few values, so that costs meet their limits, and each other, exactly
 MINUTES = (0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 3.75, 7.5, 15.0, 30.0, 60.0)
 SET: Dict[str, Tuple[Dict[str, float], ...]] = {
@@ -73,19 +70,12 @@ FAILURES = 'aborted', 'aborted: no object'
 
 def tell() -> Dict[str, List[str]]:
     """Return a line for each thing that is told, by the draws that it comes from."""
-    told: Dict[str, List[str]] = {}
-    for what, number, lines in (
-        ('situations', SITUATIONS, _of_situation),
-        ('rates', RATES, _of_rates),
-        ('sentences', SENTENCES, _of_sentence),
-    ):
-        for first in range(number):
-            told['{} {}'.format(what, first)] = [
-                rounded('{}: {}'.format(seed, line))
-                for seed in range(first * EACH, (first + 1) * EACH)
-                for line in lines(random.Random('{} {}'.format(what, seed)))
-            ]
-    return told
+    groups = (
+        ('situations', 12, _of_situation),
+        ('rates', 6, _of_rates),
+        ('sentences', 2, _of_sentence),
+    )
+    return drawn(groups, draws=40)
 
 
 # -- what policies do

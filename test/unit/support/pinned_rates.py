@@ -20,8 +20,8 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import write_told
-from pinned_trees import Told, logged, plan_of, rounded
+from pinned import rounded, write_told
+from pinned_trees import Told, logged, plan_of
 from tree_model.drawing import Shape
 
 from smach_oracle.oracle.machine.nesting import records_of

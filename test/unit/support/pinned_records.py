@@ -15,8 +15,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import write_told
-from pinned_trees import rounded
+from pinned import drawn, write_told
 
 from smach_oracle.oracle.decision.ways import PLACES, WayKind, WayResult
 from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind
@@ -45,28 +44,20 @@ from smach_oracle.oracle.records.way_results import (
     merged_ways,
 )
 
-EACH = 20  # draws under one digest
 LABELS = 'ABCD'
 VALUES = (None, True, 0, 3, -1, -2, 1.0, 'policy', 'budget', 'outcome', 'kept', 'A', ['A', 'B'], {})
 
 
 def tell() -> Dict[str, List[str]]:
     """Return a line for each thing that is told, by the draws that it comes from."""
-    told: Dict[str, List[str]] = {}
-    for what, number, lines in (
+    groups = (
         ('visits', 6, _of_visits),
         ('ways', 4, _of_ways),
         ('streaks', 2, _of_streaks),
         ('facts', 6, _of_facts),
         ('texts', 4, _of_texts),
-    ):
-        for first in range(number):
-            told['{} {}'.format(what, first)] = [
-                rounded('{}: {}'.format(seed, line))
-                for seed in range(first * EACH, (first + 1) * EACH)
-                for line in lines(random.Random('{} {}'.format(what, seed)))
-            ]
-    return told
+    )
+    return drawn(groups, draws=20)
 
 
 # -- visits

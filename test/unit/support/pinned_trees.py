@@ -25,7 +25,7 @@ if __name__ == '__main__':
 
 from fake_clock import FakeClock
 from killed_machines import Points, in_a_process
-from pinned import ADDRESS, FOLDER, SECONDS
+from pinned import ADDRESS, FOLDER, SECONDS, rounded
 from tree_model.answers import draw_reply
 from tree_model.drawing import UPSTREAM, Shape, draw
 from tree_model.executing import Executed, answer_of, options_of
@@ -76,7 +76,6 @@ ID = re.compile(r'\b[0-9a-f]{12}\b')
 CUT_AT = ('Traceback (most', ' with userdata:', 'InvalidStateError: A ')  # each engine's own
 # of moments and events, which threads beside each other draw
 DRAWN = re.compile(r'\b(MOMENT|number:|seq:|after:) \d+')
-NUMBER = re.compile(r'-?\d+\.\d+(?:e-?\d+)?')
 
 
 class Told(Executed):
@@ -322,11 +321,6 @@ def written(value: Any) -> str:
     for pattern, name in ((SECONDS, '# s'), (ADDRESS, ''), (ID, '#')):
         text = pattern.sub(name, text)
     return rounded(text)
-
-
-def rounded(text: str) -> str:
-    """A text with three digits of each number behind its point."""
-    return NUMBER.sub(lambda found: '{:.3f}'.format(float(found.group())), text)
 
 
 def _is_told(key: str) -> bool:
