@@ -5,9 +5,9 @@
     [--report FILE]
 
 Each mutant is one change of one expression or statement in src/smach_oracle/oracle, such as `<`
-made `<=`, a condition turned around, or a call left out. A mutant is killed if a file of tests in
-test/unit/oracle fails twice, or does not end. Only the files that reach its statement run, the
-quickest first. The mutants that survive are shown, each with its name, which --only takes. Those
+made `<=`, a condition turned around, or a call left out. A mutant is killed if a test in
+test/unit/oracle fails twice, or does not end. Only the tests that reach its statement run, quick
+ones first. The mutants that survive are shown, each with its name, which --only takes. Those
 in mutants_equivalent.csv change nothing that anybody sees, for the reason given there, and are
 not counted. The exit status is 1 where fewer than 95% of the others are killed.
 
@@ -19,6 +19,7 @@ import argparse
 import collections
 import contextlib
 import csv
+import itertools
 import os
 import random
 import signal
@@ -65,8 +66,9 @@ def main() -> int:
     try:
         with tempfile.TemporaryDirectory(prefix='mutants.') as folder:
             workshop = Workshop(EXECUTIVE, Path(folder), arguments.jobs)
-            print('each file of tests runs once, to see which lines it reaches', flush=True)
-            try_all(workshop, mutants, list(workshop.look()), trials)
+            print('each test runs once, to see which lines it reaches', flush=True)
+            reaches = list(itertools.chain.from_iterable(workshop.look()))
+            try_all(workshop, mutants, reaches, trials)
             is_whole = True
     except TestsNotRun as error:
         sys.exit(str(error))

@@ -2,6 +2,7 @@
 
 import ast
 import csv
+import itertools
 import os
 import random
 import subprocess
@@ -163,12 +164,15 @@ def in_a_fork():
 def left():
     return 5
 
+def shared():
+    return 7
+
 def waits(event):
     while not event.is_set():
         event.wait(0.01)
 """
 TEST = """
-import m, threading
+import m, pytest, threading
 
 def test_at_least():
     assert m.at_least(2, 1) and not m.at_least(1, 2)
@@ -181,6 +185,16 @@ def test_in_a_child():
 
 def test_in_a_fork():
     assert m.in_a_fork() == 5
+
+@pytest.fixture(scope='module')
+def made_once():
+    return m.shared()
+
+def test_begins(made_once):
+    pass
+
+def test_shared(made_once):
+    assert made_once == 7
 
 def test_waits():
     event = threading.Event()
@@ -205,6 +219,11 @@ def workshop(tmp_path, monkeypatch):
     return project, trying.Workshop(project, tmp_path, 1)
 
 
+def reaches_of(shop):
+    """What its tests reach."""
+    return list(itertools.chain.from_iterable(shop.look()))
+
+
 def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
     project, shop = workshop
     wanted = {
@@ -212,6 +231,7 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
         '3': {'(3 + 1)': 'unreached'},
         'a * 2': {'(a / 2)': 'killed'},  # a child of the test reaches it
         '5': {'(5 + 1)': 'killed'},  # so does one that it forks
+        '7': {'(7 + 1)': 'killed'},  # the second test sees what is made for the first one, too
         'len(found) < to': {'len(found) >= to': 'killed'},
         'found.append(bytes(1 << 22))': {'pass': 'hung'},
         'not event.is_set()': {'(event.is_set())': 'hung'},
@@ -220,11 +240,13 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
         mutant for mutant in project.mutants() if mutant.after in wanted.get(mutant.before, ())
     ]
     before = {path: path.read_text() for path in project.root.rglob('*.*')}
-    trials = list(shop.try_all(mutants, list(shop.look())))
+    trials = list(shop.try_all(mutants, reaches_of(shop)))
     assert [(trial.mutant.before, trial.mutant.after, trial.verdict) for trial in trials] == [
         (each.before, each.after, wanted[each.before][each.after]) for each in mutants
     ]
     assert len(trials) == sum(map(len, wanted.values()))
+    seen_by = {trial.mutant.before: trial.by for trial in trials if trial.verdict == 'killed'}
+    assert seen_by['7'] == CHECKS + '/test_m.py::test_shared'
     assert {path: path.read_text() for path in project.root.rglob('*.*')} == before
     left = subprocess.run(
         ['pgrep', '-f', str(project.root.parent)], stdout=subprocess.PIPE, check=False
@@ -240,7 +262,7 @@ def test_a_mutant_that_collects_without_end_has_the_memory_of_one_test(workshop)
         if mutant.before == 'len(found) < to' and mutant.after == 'len(found) <= to'
     ]
     endless = endless._replace(text='True')
-    (trial,) = shop.try_all([endless], list(shop.look()))
+    (trial,) = shop.try_all([endless], reaches_of(shop))
     assert trial.verdict == 'killed', 'by a MemoryError'
 
 
@@ -254,10 +276,10 @@ def test_tests_that_fail_without_a_mutant_are_named(workshop):
 
 def test_a_test_that_fails_once_does_not_kill(workshop):
     project, shop = workshop
-    reaches = list(shop.look())
+    reaches = reaches_of(shop)
     for path in project.root.parent.glob('0/{}/test_m.py'.format(CHECKS)):
         path.write_text(
-            'import os, m\ndef test_it():\n  if not os.path.exists("been"):\n'
+            'import os, m\ndef test_at_least():\n  if not os.path.exists("been"):\n'
             '    open("been", "w")\n    assert False'
         )
     (alive,) = [mutant for mutant in project.mutants() if mutant.after == 'a > b']

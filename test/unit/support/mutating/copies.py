@@ -1,11 +1,14 @@
 """Copies of the tree: tests run there, so that the checkout stays as it is."""
 
+import collections
+import json
 import os
+import re
 import shutil
 import sys
 import time
 from pathlib import Path
-from typing import Dict, Iterator, List, NamedTuple, Sequence, Set, Tuple
+from typing import DefaultDict, Dict, List, NamedTuple, Sequence, Set, Tuple
 
 from processes import Runner
 
@@ -16,6 +19,7 @@ LOG = 'pytest.log'
 MEMORY = ('prlimit', '--as={}'.format(4 << 30))
 TOO_LATE = 'not done after'  # a word of `Runner`
 NOT_RUN = ('exit status 4', 'exit status 5')  # pytest's: wrong arguments, and no tests
+FAILED = re.compile('^(?:FAILED|ERROR) (.+?)(?: - .*)?$', re.MULTILINE)
 # in each process that the tests start or fork, one that ends by os._exit among them
 MEASURES = """import os
 import coverage
@@ -31,6 +35,44 @@ def save_and_leave(status):
 if measured is not None:
     os._exit = save_and_leave
 """
+# a plugin for pytest: says to which test a line belongs, and how long each takes. What a file makes
+# once for its tests belongs to none of them
+BY_TEST = """import json
+import os
+import time
+
+import coverage
+import pytest
+
+contexts, times = [''], {}
+
+def enter(context):
+    contexts.append(context)
+    coverage.Coverage.current().switch_context(context)
+
+def leave():
+    contexts.pop()
+    coverage.Coverage.current().switch_context(contexts[-1])
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item):
+    enter(item.nodeid)
+    begun_s = time.monotonic()
+    yield
+    times[item.nodeid] = time.monotonic() - begun_s
+    leave()
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_fixture_setup(fixturedef):
+    enter(contexts[-1] if fixturedef.scope == 'function' else '')
+    yield
+    leave()
+
+def pytest_sessionfinish():
+    with open(os.environ['TIMES_OF_TESTS'], 'w') as file:
+        json.dump(times, file)
+"""
+Line = Tuple[str, int]  # module, number
 
 
 class TestsNotRun(Exception):
@@ -43,6 +85,19 @@ class Ending(NamedTuple):
     is_fine: bool
     is_hung: bool
     took_s: float
+
+
+class Reach(NamedTuple):
+    """A test, or a file of tests: the lines that it reaches, and how long it takes."""
+
+    test: str  # pytest's name of it
+    lines: Set[Line]
+    took_s: float
+
+    @property
+    def file(self) -> str:
+        """Its file."""
+        return self.test.split('::')[0]
 
 
 class Copy:
@@ -81,31 +136,45 @@ class Copy:
             raise TestsNotRun(self.last_words())
         return Ending(not problem, problem.startswith(TOO_LATE), time.monotonic() - begun_s)
 
-    def measure(self, test: str, below: str, limit_s: float) -> Tuple[Ending, Set[Tuple[str, int]]]:
-        """Run a file of tests, and return which lines of which modules it reaches.
+    def measure(self, file: str, below: str, limit_s: float) -> Tuple[Ending, List[Reach]]:
+        """Run a file of tests, and return which lines of which modules each test reaches. Lines
+        that a child process reaches, and what the tests share, are those of the file as a whole.
 
         :param below: folder with the modules. Their paths are given from there.
         """
         shutil.rmtree(str(self._measured), ignore_errors=True)
         self._measured.mkdir()
-        settings = self._measured / 'settings'
+        settings, times = self._measured / 'settings', self._measured / 'times'
         settings.write_text(
             '[run]\nparallel = True\nsource = {}\ndata_file = {}\n'.format(
                 self.folder / below, self._measured / 'lines'
             )
         )
         (self._measured / 'sitecustomize.py').write_text(MEASURES)
+        (self._measured / 'by_test.py').write_text(BY_TEST)
         ending = self.run(
-            [test],
+            ['-p', 'by_test', file],
             limit_s,
-            {'COVERAGE_PROCESS_START': str(settings), 'PYTHONPATH': str(self._measured)},
+            {
+                'COVERAGE_PROCESS_START': str(settings),
+                'TIMES_OF_TESTS': str(times),
+                'PYTHONPATH': str(self._measured),
+            },
         )
-        return ending, set(self._lines(self.folder / below))
+        if not ending.is_fine:
+            return ending, []
+        lines = self._lines(self.folder / below)
+        took_s = json.loads(times.read_text())
+        return ending, [
+            Reach(test or file, lines[test], took_s.get(test, ending.took_s)) for test in lines
+        ]
 
-    def _lines(self, below: Path) -> Iterator[Tuple[str, int]]:
+    def _lines(self, below: Path) -> Dict[str, Set[Line]]:
+        """Return the lines by test. Those under '' belong to the file as a whole."""
         from coverage import CoverageData
         from coverage.exceptions import CoverageException
 
+        found: DefaultDict[str, Set[Line]] = collections.defaultdict(set)
         for path in self._measured.glob('lines.*'):
             data = CoverageData(str(path))
             try:
@@ -113,12 +182,20 @@ class Copy:
             except CoverageException:  # its process was killed as it wrote
                 continue
             for module in data.measured_files():
-                for line in data.lines(module) or ():
-                    yield str(Path(module).relative_to(below)), line
+                name = str(Path(module).relative_to(below))
+                for number, tests in data.contexts_by_lineno(module).items():
+                    for test in tests:
+                        found[test].add((name, number))
+        return found
 
     def last_words(self) -> str:
         """Return the end of the output of the latest run."""
         return (self.folder / LOG).read_text(errors='replace')[-2000:]
+
+    def first_failed(self) -> str:
+        """Return the name of the test that failed in the latest run, or '' where none is named."""
+        found = FAILED.search((self.folder / LOG).read_text(errors='replace'))
+        return found.group(1) if found else ''
 
     def files_of_tests(self, below: str) -> List[str]:
         """Return the files of tests below a folder."""

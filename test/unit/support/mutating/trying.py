@@ -1,18 +1,30 @@
 """Mutants put in and tried: which of them does no test see?"""
 
+import collections
 import queue
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
-from typing import Callable, Generator, List, NamedTuple, Sequence, Set, Tuple, TypeVar
+from typing import (
+    Callable,
+    Dict,
+    Generator,
+    Iterator,
+    List,
+    NamedTuple,
+    Sequence,
+    Tuple,
+    TypeVar,
+)
 
 from processes import Runner
 
-from .copies import Copy, TestsNotRun
+from .copies import Copy, Reach, TestsNotRun
 from .mutations import Mutant, mutants_of
 
 ATTEMPTS = 3  # of tests that should pass, on a machine that does other work, too
 MEASURING_S = 600.0
-SPARE_S, SLOWER = 60.0, 6.0  # a file of tests that takes longer than this hangs
+SPARE_S, SLOWER = 60.0, 4.0  # tests that take longer than this hang
+FEW = 25  # tests of the first run. Each further run has as many times more
 
 Item = TypeVar('Item')
 Found = TypeVar('Found')
@@ -35,26 +47,13 @@ class Project(NamedTuple):
         ]
 
 
-class Reach(NamedTuple):
-    """A file of tests: the lines that it reaches, as module and number, and how long it takes."""
-
-    test: str
-    lines: Set[Tuple[str, int]]
-    took_s: float
-
-    @property
-    def limit_s(self) -> float:
-        """How long the file may take before it counts as hung."""
-        return SPARE_S + SLOWER * self.took_s
-
-
 class Trial(NamedTuple):
     """What became of a mutant."""
 
     mutant: Mutant
     verdict: str  # killed, hung, survived, or unreached: no test comes to its statement
-    by: str  # the file of tests that has killed it
-    tests: int  # files of tests that come to its statement
+    by: str  # the test that has killed it
+    tests: int  # that come to its statement
     took_s: float
 
     @property
@@ -77,8 +76,8 @@ class Workshop:
             self._copies.put(copy)
             self._tests = copy.files_of_tests(project.tests)
 
-    def look(self) -> Generator[Reach, None, None]:
-        """Yield which lines each file of tests reaches.
+    def look(self) -> Generator[List[Reach], None, None]:
+        """Yield which lines the tests of each file reach.
 
         :raises TestsNotRun: where one fails although nothing was changed.
         """
@@ -112,42 +111,61 @@ class Workshop:
                 raise
 
 
-def _measure(copy: Copy, test: str, below: str) -> Reach:
+def _measure(copy: Copy, file: str, below: str) -> List[Reach]:
     for _ in range(ATTEMPTS):
-        ending, lines = copy.measure(test, below, MEASURING_S)
+        ending, reaches = copy.measure(file, below, MEASURING_S)
         if ending.is_fine:
-            return Reach(test, lines, ending.took_s)
-    raise TestsNotRun('{} fails without a mutant:\n{}'.format(test, copy.last_words()))
+            return reaches
+    raise TestsNotRun('{} fails without a mutant:\n{}'.format(file, copy.last_words()))
 
 
 def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
-    """Put a mutant in, run the tests that reach it, the quickest first, and take it out."""
+    """Put a mutant in, run the tests that reach it, and take it out."""
     first, last = mutant.statement
     wanted = {(mutant.module, line) for line in range(first, last + 1)}
-    tests = sorted((each for each in reaches if each.lines & wanted), key=lambda each: each.took_s)
+    tests = [each for each in reaches if each.lines & wanted]
     path = copy.folder / below / mutant.module
     original = path.read_text('utf-8')
     path.write_text(mutant.applied(original), 'utf-8')
     took_s = 0.0
     try:
-        for reach in tests:
-            verdict, test_s = _verdict_of(copy, reach)
-            took_s += test_s
+        for run in _in_runs(tests):
+            verdict, run_s = _verdict_of(copy, run)
+            took_s += run_s
             if verdict:
-                return Trial(mutant, verdict, reach.test, len(tests), took_s)
+                return Trial(mutant, verdict, copy.first_failed(), len(tests), took_s)
     finally:
         path.write_text(original, 'utf-8')
     return Trial(mutant, 'survived' if tests else 'unreached', '', len(tests), took_s)
 
 
-def _verdict_of(copy: Copy, reach: Reach) -> Tuple[str, float]:
-    """Return whether a file of tests kills the mutant that is in, and how long it took.
+def _in_runs(tests: List[Reach]) -> Iterator[List[Reach]]:
+    """Yield the tests in runs. The quickest of each file come first: they kill most mutants."""
+    before: Dict[str, int] = collections.Counter()
+    ranked = []
+    for each in sorted(tests, key=lambda each: each.took_s):
+        before[each.file] += 1
+        ranked.append((before[each.file], each))
+    ranked.sort(key=lambda pair: pair[0])
+    begin, size = 0, FEW
+    while begin < len(ranked):
+        # those of a file one after the other, for what they share
+        yield sorted(each for _, each in ranked[begin : begin + size])
+        begin, size = begin + size, size * FEW
 
-    A test that fails once and then passes has failed for another reason.
+
+def _verdict_of(copy: Copy, tests: Sequence[Reach]) -> Tuple[str, float]:
+    """Return whether tests kill the mutant that is in, and how long they took.
+
+    What fails once and then passes has failed for another reason.
     """
+    limit_s = SPARE_S + SLOWER * sum(each.took_s for each in tests)
     took_s, failed = 0.0, 0
     for _ in range(ATTEMPTS):
-        ending = copy.run([reach.test], reach.limit_s, {})
+        try:
+            ending = copy.run([each.test for each in tests], limit_s, {})
+        except TestsNotRun:  # a module does not load any more
+            return 'killed', took_s
         took_s += ending.took_s
         if ending.is_hung:
             return 'hung', took_s
