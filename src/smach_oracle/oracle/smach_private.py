@@ -274,11 +274,7 @@ class EngineProbe:
 
     def __init__(self) -> None:
         self.stepped = False
-        self.lock_is_held = False
         self.attentive = True
-        self.stays_attentive = True
-        self.tells_transitions = True
-        self.has_own_loop = False
 
     def ring(self) -> None:
         """Look closely from now on: a state around the machine was abandoned."""

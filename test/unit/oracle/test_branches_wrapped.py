@@ -268,7 +268,8 @@ def test_an_attribute_of_a_state_is_not_hidden_while_it_runs():
 
     class Reads(smach.Concurrence):
         def execute(self, parent_ud=None):
-            found.extend((each.state, each.branch) for each in self._states.values())
+            for each in self._states.values():
+                found.append((each.state, each.branch, copy.copy(each).state))
             return super().execute(parent_ud)
 
     found = []
@@ -277,7 +278,7 @@ def test_an_attribute_of_a_state_is_not_hidden_while_it_runs():
     for state in concurrence.get_children().values():
         state.state, state.branch = 'open', 'left'
     assert Watched(inside(concurrence)).run() == 'done'
-    assert found == [('open', 'left')] * 2
+    assert found == [('open', 'left', 'open')] * 2
 
 
 def test_what_is_no_outcome_is_not_told_as_one():

@@ -181,3 +181,18 @@ def test_what_a_call_says_too_late_is_dropped(monkeypatch, is_asked_meanwhile):
     go.set()
     assert ended.wait(10) and wait_for(port._call.done.is_set)
     assert port.why_unwell(Scope()) == 'is_well: motors: off'
+
+
+def test_who_asks_while_another_asks_waits_for_its_turn():
+    def is_well():
+        entered.set()
+        assert go.wait(20)
+        return 'off'
+
+    entered, go, watch = threading.Event(), threading.Event(), health_watch.HealthWatch(is_well)
+    watch.use((), 0.0)
+    calls = [in_thread(lambda: watch.why_unwell(Scope()))]
+    assert entered.wait(20)
+    calls.append(in_thread(lambda: watch.why_unwell(Scope())))
+    go.set()
+    assert [call.result() for call in calls] == ['is_well: off'] * 2

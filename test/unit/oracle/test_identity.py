@@ -102,6 +102,13 @@ def test_an_object_is_taken_out_of_a_list_once(both):
     assert len(items) == 1
 
 
+@pytest.mark.parametrize('name', ['', None, 7])
+def test_what_has_no_name_goes_by_that_of_its_class(name):
+    slotted = EqualToAll()
+    slotted.__class__ = type('Named', (), {'__name__': name})
+    assert name_of(slotted) == 'Named'
+
+
 def test_what_a_class_refuses_to_say_is_nothing(both):
     assert own_attributes(Slotted()) == {}
     assert attribute_of(both[0], '__name__') is None

@@ -11,6 +11,7 @@ import smach
 from smach_oracle.oracle.records.events import EventKind
 
 ASKS = {'max_recoveries': 0}
+TO_ABORTED = {'loop_outcomes': ['ok'], 'final_outcome_map': {'stuck': 'aborted'}}
 
 
 def each_of(state, label, items=(1, 2), loop=('done',), **contained):
@@ -183,3 +184,68 @@ def test_items_that_can_be_had_once_and_raise_end_with_their_own_error():
     assert len(failures) > 1 and all('ValueError: dropped' in each.text for each in failures)
     once = 'what it goes through can be iterated only once, and has raised an error'
     assert once in [each.text for each in watched.of(EventKind.WARNING)]
+
+
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')),
+    reason="upstream's Iterator takes an error for the end of the items",
+)
+@pytest.mark.parametrize(
+    'to, told, done',
+    [
+        ('ALL', ['goes on behind item 2'], [1, 2]),
+        (
+            'FIRST',
+            ['begins with its first item again: items 1 to 2 that had ended are repeated'],
+            [1, 2, 1, 2],
+        ),
+    ],
+)
+def test_after_an_error_in_getting_an_item_those_before_are_finished(to, told, done):
+    def items():
+        calls.append(1)
+        yield from (1, 2)
+        if not expert.questions:
+            raise ValueError('dropped')
+        yield 3
+
+    calls, each = [], Item(item3=['stuck'], outcomes=('ok', 'stuck', 'preempted'))
+    machine = chain(FIRST=Scripted(), ALL=iterator_over(each, items, **TO_ABORTED))
+    machine.userdata.done = []
+    expert = FakeExpert(goto(to, container='TOP'), goto('ALL', container='TOP'))
+    watched = Watched(machine, name='TOP', expert=expert, settings=ASKS)
+    assert watched.run() == 'done'
+    assert each.tried == [*done, 3, 3] and watched.machine.userdata.done[-3:] == [1, 2, 3]
+    assert len(calls) == 2, 'the items are got again after the error alone'
+    warnings = [each.text for each in watched.of(EventKind.WARNING)]
+    assert warnings[1:] == [*told, 'goes on with item 3, which is repeated']
+
+
+def test_the_count_of_items_is_not_told_once_there_are_more():
+    def grows(state, ud):
+        items.append(2)
+        return 'ok'
+
+    items = [1]
+    watched = Watched(inside(iterator_over(Item(item1=[grows], item2=['aborted']), items)))
+    assert watched.run() == 'done'
+    assert [event.text for event in watched.of(EventKind.FAILURE)] == ['item 2']
+
+
+def test_an_iterator_of_a_wrapped_machine_can_be_executed_alone():
+    each = Item()
+    iterator = iterator_over(each, (1, 2))
+    iterator.userdata.done = []
+    watched = Watched(inside(iterator))
+    assert iterator.execute(None) == 'done' and iterator.userdata.done == [1, 2]
+    assert watched.run() == 'done' and each.tried == [1, 2, 1, 2]
+
+
+def test_an_item_counts_among_the_keys_that_a_state_finds():
+    inner = chain(LOOK=Scripted(), HOLD=Scripted(input_keys=['item', 'grip']))
+    inner.register_input_keys(['item'])
+    expert = FakeExpert(give_up())
+    machine = chain(FIND=Scripted('aborted'), ALL=each_of(inner, 'item'))
+    Watched(machine, name='TOP', expert=expert, settings=ASKS).run()
+    missing = {choice.state: choice.missing_keys for choice in expert.questions[0].choices}
+    assert missing['HOLD'] == ('grip',)

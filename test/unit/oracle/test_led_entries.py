@@ -3,11 +3,16 @@
 import copy
 import threading
 
+from guarded_machines import chain
+from held_machines import Held
 from machines import FakeExpert, Scripted, goto, watched
 from test_still_running import asked
 
 import smach
+from smach_oracle.oracle.control.control import Jump
 from smach_oracle.oracle.records.events import EventKind
+
+ASKS = {'max_recoveries': 0}
 
 
 def test_the_longest_visit_counts_and_not_the_latest():
@@ -61,3 +66,60 @@ def test_a_copy_that_is_made_at_a_jump_was_led_nowhere():
     assert {question.failed_state for question in expert.questions} == {'A', 'B'}
     del expert.questions[:]
     assert copies[0].execute() == 'done' and not expert.questions
+
+
+def test_a_state_that_is_passed_by_at_a_preempt_is_begun_from_its_start_later():
+    inner = chain(X=Scripted(), Y=Scripted())
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('FIND', Scripted('aborted'), {'ok': 'PICK'})
+        smach.StateMachine.add('PICK', inner, {'preempted': 'CLEAN'})
+        smach.StateMachine.add('CLEAN', Scripted(), {'ok': 'FIND'})
+    expert = FakeExpert(goto('Y', container='SM_ROOT/PICK'))
+    held = Held(machine, expert=expert, settings=ASKS)
+    held.hand.set_breakpoint('PICK')
+    with held.begin():
+        held.waits_before('SM_ROOT/PICK')
+        held.hand.remove_breakpoint('PICK')
+        held.hand.preempt()
+        assert held.end() == 'done'
+    assert held.visits() == ['FIND', 'CLEAN', 'FIND', 'PICK', 'X', 'Y']
+
+
+def test_a_jump_into_a_machine_that_ends_before_leaves_nothing_to_its_next_execution():
+    inner = chain(FIND=Scripted('aborted'), PICK=chain(X=Scripted(), Y=Scripted()))
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('WORK', inner, {'preempted': 'REST'})
+        smach.StateMachine.add('REST', Scripted(), {'ok': 'WORK'})
+    expert = FakeExpert(goto('Y', container='SM_ROOT/WORK/PICK'))
+    held = Held(machine, expert=expert, settings=ASKS)
+    held.hand.set_breakpoint('PICK')
+    with held.begin():
+        held.waits_before('SM_ROOT/WORK/PICK')
+        held.hand.remove_breakpoint('PICK')
+        inner.request_preempt()
+        held.waits_before('SM_ROOT/REST')
+        held.hand.resume()
+        assert held.end() == 'done'
+    assert held.visits() == ['WORK', 'FIND', 'REST', 'WORK', 'FIND', 'PICK', 'X', 'Y']
+
+
+def test_a_class_that_executes_twice_is_led_once():
+    class Twice(smach.StateMachine):
+        def execute(self, parent_ud=None):
+            super().execute(parent_ud)
+            return super().execute(parent_ud)
+
+    inner = chain(X=Scripted(), Y=Scripted())
+    inner.__class__ = Twice
+    expert = FakeExpert(goto('Y', container='SM_ROOT/PICK'))
+    held = Held(chain(FIND=Scripted('aborted'), PICK=inner), expert=expert, settings=ASKS)
+    assert held.run() == 'done'
+    assert held.visits() == ['FIND', 'PICK', 'Y', 'X', 'Y']
+
+
+def test_a_wish_that_came_too_late_is_not_for_the_next_trial():
+    held = Held(chain(A=Scripted(), B=Scripted()))
+    held.machine._oracle.tree.control.ask_jump('SM_ROOT', Jump('B'))  # as if it still ran
+    assert held.run() == 'done' and held.visits() == ['A', 'B']

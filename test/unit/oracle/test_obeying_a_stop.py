@@ -297,3 +297,24 @@ def test_once_a_stop_is_over_a_machine_need_not_look_for_an_operator():
     assert control.is_set, 'it lifts the pause on its way'
     control.stop_is_over()
     assert not control.is_set
+
+
+def test_a_machine_that_is_entered_for_its_clean_up_is_no_work_though_it_has_run_before():
+    trail = Trail()
+    inner = machine_of(
+        X=(trail.state('X'), {'ok': 'done', 'preempted': 'CLEAN'}),
+        CLEAN=(trail.state('CLEAN', 'aborted', 'ok'), {'ok': 'done'}),
+    )
+    outer = machine_of(
+        N=(inner, {'done': 'BACK', 'aborted': 'aborted'}), BACK=(trail.state('BACK'), {'ok': 'N'})
+    )
+    held = Held(outer, settings={'max_recoveries': 9})
+    held.hand.set_breakpoint('BACK')
+    with held.begin():
+        held.waits_before('SM_ROOT/BACK')
+        held.hand.set_breakpoint('N')
+        held.hand.resume()
+        held.waits_before('SM_ROOT/N')
+        held.hand.preempt()
+        assert held.end() == 'aborted'
+    assert trail.ran == ['X', 'BACK', 'CLEAN']

@@ -20,6 +20,7 @@ from smach_oracle.oracle.execution.origin import (
     origin_of,
 )
 from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.settings.health import HealthCondition, HealthKind
 
 SCRIPT = """
 import json, smach
@@ -99,6 +100,14 @@ def test_settings_have_the_same_digest_if_they_are_the_same():
 def test_other_settings_have_another_digest(other):
     assert digest(other) != digest({'memory': 20, 'states': {'PICK': {'on_retry': 'never'}}})
     assert digest(other) != digest({})
+
+
+def test_a_topic_and_a_status_of_one_name_have_not_the_same_digest():
+    topic, status = (
+        Settings(healthy=(HealthCondition(kind, 'power', source='/power'),))
+        for kind in (HealthKind.TOPIC, HealthKind.DIAGNOSTICS)
+    )
+    assert origin_of(topic)['settings'] != origin_of(status)['settings']
 
 
 def test_a_function_among_the_settings_counts_by_its_name():

@@ -139,3 +139,14 @@ def test_from_before_a_precondition_a_machine_goes_nowhere_else() -> None:
         held.hand.resume()
         assert held.end() == 'done'
     assert (first.runs, held.visits()[-1]) == (2, 'C')
+
+
+def test_a_breakpoint_before_an_item_pauses_the_machine() -> None:
+    held = Held(items_machine(Scripted()), settings={'nested': False})
+    held.hand.set_breakpoint('ITEM')
+    with held.begin():
+        held.waits_before('SM_ROOT/EACH/ITEM')
+        assert held.hand.status().paused_by == 'breakpoint ITEM'
+        held.hand.remove_breakpoint('ITEM')
+        held.hand.resume()
+        assert held.end() == 'done'

@@ -185,3 +185,40 @@ def test_an_item_that_was_finished_before_an_error_keeps_what_it_wrote():
     _, left = total_of(machine)
     # to upstream's engine the error is the end of the items
     assert left in ((2, [1, 2]), (1, [1]))
+
+
+class Named(list):
+    """A list that is not one to everybody."""
+
+
+class Touchy(list):
+    """Nobody can tell whether two of them are equal."""
+
+    def __eq__(self, other):
+        raise ValueError('which of them?')
+
+
+@pytest.mark.parametrize(
+    'given, written, copied, left',
+    [
+        ([], None, ['names'], [1, 2, 3]),
+        ([], ['new'], ['names'], ['new', 2, 3]),
+        ([], Named(), ['names'], [2, 3]),
+        (Touchy(), None, ['names'], [2, 3]),
+        (Touchy(), None, [], [1, 2, 3]),
+    ],
+    ids=['as before', 'another', 'of another class', 'not comparable', 'the same object'],
+)
+def test_what_is_given_from_above_replaces_it_where_that_is_not_as_before(
+    given, written, copied, left
+):
+    def writes(ud):
+        if written is not None:
+            ud.names = written
+        return True
+
+    machine = machine_of(over(Adds('ok', 'stuck')))
+    machine.userdata.names = given
+    states = {'ALL': {'preconditions': [writes]}}
+    total_of(machine, states=states, deep_copy_keys=copied)
+    assert machine.userdata.names == left

@@ -39,6 +39,19 @@ def test_a_clock_shows_no_time_in_which_anybody_paused_it(pauses):
     assert (time_.left_s(2.0), time_.left_s(1.0)) == (0.5, 0.0)
 
 
+def test_who_waits_on_the_real_clock_looks_at_it_a_few_times():
+    class Counted(Clock):
+        looks = 0
+
+        def now(self):
+            self.looks += 1
+            return super().now()
+
+    clock = Counted()
+    assert Scope(clock=clock).wait(BRIEF_S)
+    assert clock.looks < 10
+
+
 def test_a_clock_begins_again_while_it_is_paused():
     clock = FakeClock()
     time_ = PausableClock(clock)

@@ -213,6 +213,23 @@ def test_a_machine_that_does_not_run_begins_there() -> None:
     assert [state.runs for state in states] == [0, 1]
 
 
+def test_each_branch_of_a_concurrence_can_be_meant() -> None:
+    held = Held(chain(BOTH=both(LEFT=Scripted(), RIGHT=Scripted())))
+    for label in ('LEFT', 'RIGHT'):
+        told = 'SM_ROOT/BOTH does not run; it will begin in ' + label
+        assert held.hand.go_to('SM_ROOT/BOTH', label) == told
+
+
+def test_once_sent_the_machine_takes_the_short_way_again() -> None:
+    gate = Gate()
+    with Held(chain_of(Scripted(gate), Scripted(), Scripted(), Scripted())).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.go_to('', 'C')
+        gate.opened.set()
+        assert held.end() == 'done'
+        assert not held.machine._oracle.engine.attentive
+
+
 def test_what_waits_in_another_branch_does_not_wait_here() -> None:
     # who is held first holds the other before its first state, too
     def wait_for_a(state: Any, ud: Any) -> str:

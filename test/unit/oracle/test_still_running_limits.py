@@ -137,6 +137,20 @@ def test_the_clock_lives_on_after_an_alarm_that_fails(log):
     assert any('no more threads' in text for _, text in log)
 
 
+def test_an_alarm_that_is_due_before_those_that_wait_comes_first():
+    class Told(Clock):
+        def wait(self, *args):
+            waits.set()
+            super().wait(*args)
+
+    waits, rung = threading.Event(), threading.Event()
+    clock = AlarmClock(Told())
+    clock.ring_in(60.0, lambda: None)
+    assert waits.wait(10)
+    clock.ring_in(0.05, rung.set)
+    assert rung.wait(10)
+
+
 def test_the_answer_waits_until_the_robot_is_well():
     health = FakeHealth()
 

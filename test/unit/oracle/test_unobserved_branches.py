@@ -11,6 +11,7 @@ from test_pinned_branches import rows_of
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.records.visits import VisitResult
 
 OUTCOMES = ('done', 'aborted', 'preempted')
@@ -113,6 +114,20 @@ def test_a_preempt_on_the_short_way_reaches_the_state_and_its_visit_teaches_noth
     thread.join()
     assert state.done == [1, 2, 3, 4, 5]
     assert {row.state: row.successes for row in machine.rates()}['EACH'] == 4
+
+
+def test_a_branch_on_the_short_way_ends_before_an_operator_could_send_it(log):
+    def sends(state, ud):
+        hand.go_to('TOP/BOTH', 'LEFT')
+        return 'ok'
+
+    machine = OracleContainer.wrap(
+        inside(both(Scripted('ok', sends), Scripted()), 'BOTH'), name='TOP'
+    )
+    hand = OperatorHand(machine)
+    assert [machine.execute(), machine.execute()] == ['done', 'done']
+    assert not hand.status().jumps
+    assert any('has ended before it could be sent to LEFT' in text for _, text in log)
 
 
 def test_an_item_that_fails_on_the_short_way_finds_its_userdata_restored():

@@ -28,7 +28,6 @@ class IteratorWrapper(ContainerWrapper):
         self._given: Dict[str, object] = {}  # its io keys when it began
         self.at_item: Optional[Dict[str, object]] = None  # its userdata as the item under way began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
-        self.is_left = False
         self._is_asked_to_go_on = False
         self.goes_on = False
 
@@ -79,7 +78,7 @@ class IteratorWrapper(ContainerWrapper):
 
     def mark(self) -> Tuple[int, int]:
         """Return what is different for each item: its number, and that of the round."""
-        return self._rounds, self.tracked.number if self.tracked is not None else 0
+        return self._rounds, self.item_number
 
     def _iterators_around(self) -> Iterator['IteratorWrapper']:
         node: Optional[TreeNode] = self.parent
@@ -200,6 +199,6 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
     Any other Iterator of the container begins again when it is entered.
     """
     for label, state in dict(states_of(node.machine)).items():
-        wrapper = wrapper_of(state) if isinstance(state, smach.Container) else None
+        wrapper = wrapper_of(state)
         if isinstance(wrapper, IteratorWrapper):
             wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

@@ -196,7 +196,7 @@ def runs_around(node: 'TreeNode') -> Tuple[Scope, ...]:
     runs, under_way = scopes_of_thread(), node.tree.workers.under_way
     while under_way and node.parent is not None:
         run = under_way.get(id(states_of(node.parent.machine).get(node.labels_from_parent[0])))
-        if run is not None and run not in runs:
+        if run is not None:
             runs += (run,)
         node = node.parent
     return runs

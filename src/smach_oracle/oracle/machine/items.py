@@ -16,9 +16,10 @@ class TrackedItems:
     """Stands in for what an Iterator was given, while it executes.
 
     An Iterator asks it for an iterator when it begins, and for one item after the other. With
-    `goes_on` set, the next time it goes on with the item that was not finished. An item is finished
-    once the Iterator asks for the next one. It does not after an outcome that breaks, nor once it
-    is preempted. To whoever looks at it otherwise it is what the Iterator was given.
+    `goes_on` set, where it has a rest, it goes on the next time with the item that was not
+    finished. An item is finished once the Iterator asks for the next one. It does not after an
+    outcome that breaks, nor once it is preempted. To whoever looks at it otherwise it is what the
+    Iterator was given.
     """
 
     def __init__(self, given: Items, tell: Tell) -> None:
@@ -61,7 +62,7 @@ class TrackedItems:
             )
 
     def __iter__(self) -> Iterator[object]:
-        if self.goes_on and self.has_rest():
+        if self.goes_on:
             self._go_on()
         else:
             self._begin()
@@ -70,13 +71,12 @@ class TrackedItems:
 
     def _begin(self) -> None:
         source = self._source()
-        had_begun = self._items is not None
-        self._items = iter(source)
-        if had_begun and self._items is source:
+        if self._items is source:
             self._tell(
                 'what it goes through can be iterated only once, and that was begun before; '
                 'it goes on where that has ended'
             )
+        self._items = iter(source)
         self._count = len(source) if isinstance(source, Sized) else None
         self.is_finished, self.is_exhausted = True, False
         self._is_pending, self._error = False, None
@@ -119,9 +119,8 @@ class TrackedItems:
 
         :raises Exception: the same error, where they can be got only once.
         """
-        source = self._source()
-        items = iter(source)
-        if items is source:
+        items = iter(self._source())
+        if items is self._items:
             self._tell('what it goes through can be iterated only once, and has raised an error')
             raise cast(Exception, self._error)
         self._items, self._error = items, None

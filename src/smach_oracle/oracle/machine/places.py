@@ -106,9 +106,8 @@ def direct_levels(node: TreeNode, at_rest: bool = False) -> List[TreeNode]:
     """
     levels = [node]
     for above in node.around() if at_rest else levels_above(node):
-        if not is_direct(levels[-1]):
-            break
-        levels.append(above)
+        if is_direct(levels[-1]):
+            levels.append(above)
     return levels
 
 

@@ -87,13 +87,11 @@ class TrialBudget:
 
     def why_over(self) -> str:
         """Say that the minutes are over."""
-        left_s = self.left_s()
-        if left_s is None or left_s > 0:
+        minutes = self._limits.minutes
+        if minutes is None or self.left_s():
             return ''
-        minutes = '{:g}'.format(self._limits.minutes or 0.0)
-        return "the trial's {} over".format(
-            '1 minute is' if minutes == '1' else minutes + ' minutes are'
-        )
+        told = '{:g}'.format(minutes)
+        return "the trial's {} over".format('1 minute is' if told == '1' else told + ' minutes are')
 
     def left_s(self) -> Optional[float]:
         """Return how many seconds are left, 0.0 where none are. None means they are not limited."""

@@ -37,7 +37,6 @@ class AlarmClock:
                 self._thread = threading.Thread(
                     target=self._run, name='smach_oracle alarm clock', daemon=True
                 )
-                self._wakes_s = due_s
                 self._thread.start()
             elif due_s < self._wakes_s:
                 self._bell.ring()
