@@ -102,12 +102,15 @@ def test_other_settings_have_another_digest(other):
     assert digest(other) != digest({})
 
 
-def test_a_topic_and_a_status_of_one_name_have_not_the_same_digest():
-    topic, status = (
-        Settings(healthy=(HealthCondition(kind, 'power', source='/power'),))
-        for kind in (HealthKind.TOPIC, HealthKind.DIAGNOSTICS)
+def test_conditions_of_one_name_have_not_the_same_digest():
+    conditions = (
+        HealthCondition(HealthKind.TOPIC, 'power'),
+        HealthCondition(HealthKind.DIAGNOSTICS, 'power'),
+        HealthCondition(HealthKind.FUNCTION, 'power', function=os.getpid),
+        HealthCondition(HealthKind.FUNCTION, 'power', function=os.getppid),
     )
-    assert origin_of(topic)['settings'] != origin_of(status)['settings']
+    digests = {origin_of(Settings(healthy=(each,)))['settings'] for each in conditions}
+    assert len(digests) == len(conditions)
 
 
 def test_a_function_among_the_settings_counts_by_its_name():

@@ -320,6 +320,24 @@ def test_what_an_operator_wants_between_two_trials_is_no_event_of_either() -> No
         assert held.events[-1].kind is EventKind.TRIAL_END
 
 
+def test_a_stop_between_two_trials_holds_nothing_of_the_next() -> None:
+    first = Scripted()
+    held = Held(chain_of(first))
+    held.hand.pause()
+    held.hand.preempt()
+    held.machine.request_preempt()  # somebody else, whom the state obeys or not
+    with held.begin():
+        held.end()
+    assert first.runs == 1
+
+
+def test_a_machine_that_is_about_to_end_has_no_active_state() -> None:
+    held = Held(chain_of(Scripted()))
+    seen = []
+    held.machine.register_termination_cb(lambda *args: seen.append(held.hand.status().active))
+    assert held.run() == 'done' and seen == [()]
+
+
 def test_an_exit_while_an_operator_holds_the_machine_ends_the_hold() -> None:
     def interrupt(event):
         if event.kind is EventKind.HOLD_START:

@@ -52,7 +52,7 @@ def test_a_nested_machine_can_be_sent_and_a_later_wish_wins() -> None:
     with Held(machine).begin() as held:
         assert gate.entered.wait(20)
         held.hand.go_to('SM_ROOT/INNER', 'C')
-        held.hand.go_to('SM_ROOT/INNER', 'D')
+        held.hand.go_to('/SM_ROOT/INNER/', 'D')
         gate.opened.set()
         assert held.end() == 'done'
     assert [state.runs for state in states] == [0, 0, 1]
