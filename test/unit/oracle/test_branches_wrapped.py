@@ -340,3 +340,13 @@ def test_a_branch_that_cannot_be_preempted_is_named(log):
     machine.run()
     (said,) = [text for level, text in log if level == 'err' and 'mine' in text]
     assert said.startswith("Preempting state 'LEFT' raised:") and 'Traceback' in said
+
+
+def test_a_shallow_copy_has_branches_of_its_own():
+    concurrence = both(Scripted('ok', 'aborted'), Scripted())
+    assert Watched(inside(concurrence), name='TOP').run() == 'done'
+    other = Watched(inside(copy.copy(concurrence)), name='OTHER')
+    assert other.run() == 'done'
+    assert [(each.path, each.state) for each in other.of(EventKind.FAILURE)] == [
+        ('OTHER/ALL', 'LEFT')
+    ]

@@ -6,6 +6,7 @@ import copy
 import threading
 
 import pytest
+from fake_clock import FakeClock
 from machines import FakeHealth, Scripted, chain_of, in_thread, watched
 from waiting import wait_for
 
@@ -27,6 +28,8 @@ def health():
     'said, text',
     [
         (False, 'FakeHealth'),
+        (type('bool_', (), {'__bool__': lambda self: False})(), 'FakeHealth'),  # of NumPy 1
+        (type('bool', (), {'__bool__': lambda self: False})(), 'FakeHealth'),  # of NumPy 2
         ('motors: off', 'FakeHealth: motors: off'),
         (ValueError('no answer'), 'FakeHealth: ValueError: no answer'),
         (None, "FakeHealth returned None; True and '' are well"),
@@ -181,6 +184,42 @@ def test_what_a_call_says_too_late_is_dropped(monkeypatch, is_asked_meanwhile):
     go.set()
     assert ended.wait(10) and wait_for(port._call.done.is_set)
     assert port.why_unwell(Scope()) == 'is_well: motors: off'
+
+
+def test_a_port_for_topics_is_not_made_where_there_are_functions_alone(health):
+    machine, made = watched(Scripted(), health=health, settings=SETTINGS), []
+    oracle_of(machine.machine).listen_to_health(made.append)
+    assert machine.run() == 'done' and not made
+
+
+def test_a_function_is_late_at_the_very_end_of_its_limit():
+    def never():
+        entered.set()
+        assert go.wait(20)
+
+    entered, go, clock = threading.Event(), threading.Event(), FakeClock()
+    watch = health_watch.HealthWatch(never)
+    watch.use((), 0.0)
+    call = in_thread(lambda: watch.why_unwell(Scope(clock=clock)))
+    assert entered.wait(20)
+    clock.advance(health_watch.FUNCTION_LIMIT_S)
+    assert call.result() == 'never does not return'
+    go.set()
+
+
+def test_a_preempt_while_it_is_looked_again_ends_the_wait_and_nothing_is_well():
+    def is_well():
+        if asked:
+            machine.machine.request_preempt()
+            assert go.wait(20)
+        asked.append(1)
+        return 'off'
+
+    asked, go = [], threading.Event()
+    machine = watched(Scripted('aborted'), health=is_well, settings={'health_settle_s': 0.0})
+    assert machine.run() == 'preempted'
+    go.set()
+    assert [event.outcome for event in machine.of(EventKind.HEALTH_WAIT_END)] == ['stopped']
 
 
 def test_who_asks_while_another_asks_waits_for_its_turn():

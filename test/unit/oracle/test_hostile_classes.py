@@ -4,7 +4,7 @@ import gc
 
 import hostile
 import pytest
-from machines import Scripted, chain_of
+from machines import Scripted, Watched, chain_of
 
 import smach
 from smach_oracle.oracle import OperatorHand, OracleContainer, oracle_of, unwrap
@@ -242,3 +242,13 @@ def test_states_in_a_container_that_cannot_be_extended_get_no_oracle_and_a_warni
     assert machine.execute() == 'done'
     text = 'TOP/ALL: its states get no oracle, since its class cannot be extended (Final is final)'
     assert ('warn', text) in log
+
+
+def test_an_attribute_of_our_name_on_a_machine_without_an_oracle_is_its_own():
+    inner = chain_of(Scripted('aborted'))
+    inner._oracle = 'mine'
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('INNER', inner)
+    watched = Watched(machine, settings={'nested': False})
+    assert watched.run() == 'done' and inner._oracle == 'mine'

@@ -9,6 +9,7 @@ from machines import FakeExpert, Scripted, goto, watched
 from test_still_running import asked
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.control.control import Jump
 from smach_oracle.oracle.records.events import EventKind
 
@@ -123,3 +124,15 @@ def test_a_wish_that_came_too_late_is_not_for_the_next_trial():
     held = Held(chain(A=Scripted(), B=Scripted()))
     held.machine._oracle.tree.control.ask_jump('SM_ROOT', Jump('B'))  # as if it still ran
     assert held.run() == 'done' and held.visits() == ['A', 'B']
+
+
+def test_who_wraps_it_again_on_the_way_changes_nothing_of_where_it_is_led():
+    def wraps_again(userdata, active, *args):
+        if active == ['PICK']:
+            OracleContainer.wrap(held.machine, settings=dict(ASKS, still_running_s=0))
+
+    machine = chain(FIND=Scripted('aborted'), PICK=chain(X=Scripted(), Y=Scripted()))
+    machine.register_transition_cb(wraps_again)
+    expert = FakeExpert(goto('Y', container='SM_ROOT/PICK'))
+    held = Held(machine, expert=expert, settings=dict(ASKS, still_running_s=0))
+    assert held.run() == 'done' and held.visits() == ['FIND', 'PICK', 'Y']

@@ -336,3 +336,19 @@ def test_what_cannot_be_is_no_harm_where_settings_are_not_strict():
     watched = wrapped(chain(PICK=chain(GRASP=Scripted('aborted'))), 'GRASP', '/PICK', strict=False)
     assert watched.run() == 'done'
     assert 'it is a container around the state' in ends(watched)[0][4]
+
+
+def test_of_two_states_of_one_name_the_one_at_the_path_is_run():
+    looks = Scripted(), Scripted()
+    machine = chain(PICK=chain(LOOK=looks[0]), MOVE=chain(LOOK=looks[1]), GRASP=Scripted('aborted'))
+    settings = {'states': {'GRASP': {'preconditions': ['MOVE/LOOK']}}}
+    assert Watched(machine, settings=settings).run() == 'done'
+    assert [each.runs for each in looks] == [1, 2]
+
+
+def test_a_branch_that_names_itself_by_its_label_alone_names_no_state():
+    machine = chain(
+        BOTH=both(LEFT=Scripted(outcomes=('done', 'aborted')), RIGHT=chain(A=Scripted()))
+    )
+    with pytest.raises(SettingsError, match="LEFT'.*: there is no such state"):
+        Watched(machine, settings={'states': {'BOTH/LEFT': {'preconditions': ['LEFT']}}})

@@ -143,3 +143,20 @@ def test_an_exit_within_a_value_of_the_userdata_ends_the_program(count):
     with pytest.raises(KeyboardInterrupt):
         machine.machine.execute()
     assert not value.left
+
+
+@pytest.mark.parametrize('told', [True, False])
+def test_an_exit_behind_an_error_of_smach_ends_the_program_unless_it_is_hidden(told):
+    def ends(state, ud):
+        error = smach.InvalidUserCodeError('no more')
+        error.__context__ = SystemExit(3)
+        error.__suppress_context__ = not told  # as `from None` does
+        raise error
+
+    machine = Watched(chain_of(Scripted(ends)))
+    if told:
+        with pytest.raises(smach.InvalidUserCodeError):
+            machine.run()
+    else:
+        assert machine.run() == 'done'
+    assert len(machine.of(EventKind.FAILURE)) == (not told)

@@ -71,12 +71,13 @@ def test_it_is_refused_what_an_expert_is_refused() -> None:
         assert not held.hand.status().jumps
 
 
-def test_a_blocked_state_is_refused() -> None:
+@pytest.mark.parametrize('of_b', [{}, {'on_retry': 'confirm'}])
+def test_a_blocked_state_is_refused(of_b) -> None:
     gate = Gate(heeds=False)
     held = Held(
         chain_of(Scripted(gate), Scripted('aborted')),
         settings={
-            'states': {'A': {'time_limit_s': 0.1, 'grace_period_s': 0.05}},
+            'states': {'A': {'time_limit_s': 0.1, 'grace_period_s': 0.05}, 'B': of_b},
             'max_recoveries': 0,
         },
         expert=FakeExpert(goto('B')),

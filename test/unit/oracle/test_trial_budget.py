@@ -386,3 +386,19 @@ def test_the_usual_time_is_the_median_of_the_latest_twenty_trials():
         clock.advance(60.0 * minutes)
         budget.end()
     assert budget.usual_minutes == pytest.approx(2.0)
+
+
+def test_a_store_of_an_earlier_version_has_no_time_of_work():
+    budget = TrialBudget(FakeClock())
+    budget.go_on([3, 1, 60.0, 45.0])
+    assert budget.spent() == [3, 1, 60.0, 45.0]
+    budget.begin(Budget())
+    budget.go_on([3, 1, 60.0])
+    assert budget.spent() == [3, 1, 60.0, 60.0]
+
+
+def test_where_the_trial_and_the_policy_make_do_with_as_much_the_budget_is_named():
+    budget = TrialBudget(FakeClock())
+    budget.begin(Budget(recoveries=1))
+    assert not budget.take_recovery(1)
+    assert budget.take_recovery(1) == "the trial's 1 recovery is spent"

@@ -42,7 +42,8 @@ def have_asked(container: smach.Container) -> None:
 
     :raises TypeError: where its class cannot be extended.
     """
-    set_class(container, wrapped_class(_Asking, type(container)))
+    if not issubclass(type(container), _Asking):  # as a shallow copy of another one is
+        set_class(container, wrapped_class(_Asking, type(container)))
 
 
 def ask_no_more(container: smach.Container) -> None:

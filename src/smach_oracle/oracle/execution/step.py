@@ -365,11 +365,11 @@ class Step:
         node, label = self._node, self._record.label
         self._record.left_by(outcome, route.target)
         node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=route.target, **facts)
-        message = message_of(label, outcome, route.target) if route.is_state else None
+        message = message_of(label, outcome, route.target) if route.is_state else ''
         if learn:
             drawn = transitions_of(self._machine)[label].get(outcome)
             node.records.add_edge(self._record, outcome, route.target, drawn, message)
-        if message is None:
+        if not message:
             return Stop(terminate(node, label, outcome, route.target))
         go_to(node, message, route.target)
         return Stop()

@@ -210,16 +210,16 @@ class ContainerRecords:
         outcome: str,
         target: str,
         drawn: Optional[str],
-        message: Optional[str],
+        message: str,
     ) -> None:
         """Let the next success of this kind take the short way through the records.
 
-        `drawn`: see `FastEdge`. `message`: for the log, None where it ends the container.
+        `drawn`: see `FastEdge`. `message`: for the log, '' where it ends the container.
         """
         if outcome in record.fast:
             record.retire_edge(outcome)
         visit = Visit(record.label, outcome, VisitResult.SUCCESS)
-        record.fast[outcome] = FastEdge(target, drawn, message or '', visit)
+        record.fast[outcome] = FastEdge(target, drawn, message, visit)
 
     def count_oracle_edge(self, target: str) -> None:
         """Count a way out of the meta state."""

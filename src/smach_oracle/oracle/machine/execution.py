@@ -77,8 +77,7 @@ class Execution:
         """
         if self._node.tree.scope.cancelled is not None:  # it lies in no other scope
             return True
-        around = self.runs_around
-        return bool(around) and any(run.told is not None for run in around)
+        return any(run.told is not None for run in self.runs_around)
 
     @property
     def scope_around(self) -> Scope:

@@ -31,7 +31,7 @@ FUNCTION_LIMIT_S = 2.0
 class HealthPort(Protocol):
     """Knows one thing, or several, that must hold. Called from any thread. It does not wait."""
 
-    def why_unwell(self, since_s: Optional[float] = None) -> str:
+    def why_unwell(self, since_s: Optional[float]) -> str:
         """Return what is wrong, or was since that monotonic time, '' where all is well."""
 
 
@@ -70,7 +70,7 @@ class HealthFunctionPort:
         result = call.result
         if isinstance(result, str):
             return '{}: {}'.format(self._name, result) if result else ''
-        if isinstance(result, bool) or type(result).__name__ == 'bool_':  # numpy's, too
+        if type(result).__name__ in ('bool', 'bool_'):  # numpy's, too
             return '' if result else self._name
         return "{} returned {}; True and '' are well".format(self._name, repr_of(result))
 
@@ -102,7 +102,7 @@ class HealthWatch:
     diagnostics, or None where this process listens to none.
     """
 
-    def __init__(self, given: Optional[HealthFunction] = None) -> None:
+    def __init__(self, given: Optional[HealthFunction]) -> None:
         self.given = given
         self.listen: Optional[ListenToHealth] = None
         self._lock = threading.RLock()
@@ -142,12 +142,15 @@ class HealthWatch:
 
     def _listen_to(self, conditions: Tuple[HealthCondition, ...]) -> Optional[HealthPort]:
         heard = [each for each in conditions if each.kind is not HealthKind.FUNCTION]
-        if heard and self.listen is None:
+        if not heard:
+            return None
+        if self.listen is None:
             smach.logwarn(
                 'healthy: this process is not a ROS node, so {} is not listened to, and '
                 'its condition holds'.format(', '.join(sources_of(conditions)))
             )
-        return self.listen(heard) if heard and self.listen is not None else None
+            return None
+        return self.listen(heard)
 
     def why_unwell(self, scope: Scope, since_s: Optional[float] = None) -> str:
         """Ask once, and return all that is wrong, '' where all is well or `scope` is cancelled.

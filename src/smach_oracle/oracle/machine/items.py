@@ -162,7 +162,7 @@ class TrackedItems:
         return bool(self.given)
 
     def __getattr__(self, name: str) -> object:
-        if name.startswith('_') or name == 'given':
+        if name.startswith('_'):  # also while it is copied, without attributes
             raise AttributeError(name)
         return getattr(self.given, name)
 

@@ -29,8 +29,7 @@ def wrapper_of(state: object) -> Optional[Wrapper]:
     A shallow copy has the mark of another one.
     """
     mark = own_mark(state, WRAPPER)
-    is_own = mark is not None and own_mark(mark, 'container') is state
-    return cast(Wrapper, mark) if is_own else None
+    return cast(Wrapper, mark) if own_mark(mark, 'container') is state else None
 
 
 def machines_below(

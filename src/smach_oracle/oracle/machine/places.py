@@ -217,7 +217,7 @@ def why_unfit(node: TreeNode, label: str, name: str) -> str:
         return 'it is the state itself'
     if _is_around(place, node):
         return 'it is a container around the state, and runs meanwhile'
-    if place.node is not node and not place.node.site.is_container:
+    if not place.node.site.is_container:
         return 'a state of a Concurrence or an Iterator cannot be run alone'
     if _is_in_iterator(place, node):
         return 'it is in an Iterator, and there is no item where it is run alone'
@@ -334,12 +334,12 @@ def why_closed_on(way: JumpPath) -> str:
 
 
 def closed_in_words(way: JumpPath, why: str, name: str) -> str:
-    """Say that a place of this name, or one on the way down, is closed, or ''.
+    """Say that a place of this name, or one on the way down, is closed.
 
     It is a clause. `why`: as `why_closed_on` has it.
     """
     # of what lies on the way down it names the path
-    return '{} {}'.format(name, why) if why and not why.startswith(way.meeting_node.path) else why
+    return why if why.startswith(way.meeting_node.path) else '{} {}'.format(name, why)
 
 
 def repeated_on(way: JumpPath) -> Tuple[str, ...]:

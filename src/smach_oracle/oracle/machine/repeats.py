@@ -92,14 +92,11 @@ def _reached_from(node: TreeNode, target: str) -> Set[str]:
     while waiting:
         label = waiting.pop()
         reached.add(label)
-        following = transitions_of(node.machine).get(label, {}).values()
+        following = set(transitions_of(node.machine).get(label, {}).values())
         waiting.update(
             each
-            for each in following
-            if each is not None
-            and each not in reached
-            and each in states_of(node.machine)
-            and not node.is_oracle(each)
+            for each in list(states_of(node.machine))
+            if each in following and each not in reached and not node.is_oracle(each)
         )
     return reached
 

@@ -26,7 +26,7 @@ def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
 
     It leads to a state, to a container outcome by its target's or its own name, or nowhere.
     """
-    transitions = transitions_of(machine).get(label) or {}
+    transitions = transitions_of(machine).get(label, {})
     if outcome not in transitions:  # registered after the state was added: nothing was drawn for it
         return Route('', False)
     target = transitions[outcome]

@@ -52,7 +52,7 @@ class Tree:
     def __init__(
         self,
         container_class: Type[smach.StateMachine],
-        recover: bool = True,
+        recover: bool,
         expert: Optional[Expert] = None,
         health: Optional[HealthFunction] = None,
     ) -> None:

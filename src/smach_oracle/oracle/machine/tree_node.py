@@ -154,7 +154,7 @@ class TreeNode:
         above = self.parent
         while above is not None:
             execution = above.execution
-            if execution.starts_below and is_executing(above.machine):
+            if execution.starts_below:
                 start = execution.start_of(self, take)
                 if start:
                     return start

@@ -140,8 +140,7 @@ class Workers:
             end = within.run(call, settings.grace_period_s, gate.shut)
         finally:
             if call.was_left_behind:
-                is_late = end is CallEnd.OVERRUN and scope.reason is None
-                self._block(function, call, _LATE if is_late else _STOPPED)
+                self._block(function, call, _LATE if end is CallEnd.OVERRUN else _STOPPED)
             if end is CallEnd.BY_ITSELF and not self.abandoned:
                 self._idle.append(thread)
             else:
@@ -190,9 +189,7 @@ class _KeptRequest:
     goal before. A deep copy of the state does not run. `own`: what a user had put in this place.
     """
 
-    def __init__(
-        self, state: smach.State, call: Optional[BackgroundCall] = None, own: object = None
-    ) -> None:
+    def __init__(self, state: smach.State, call: Optional[BackgroundCall], own: object) -> None:
         self._state = state
         self._call = call
         self.own = own
