@@ -256,3 +256,11 @@ def test_an_outcome_registered_after_its_state_was_added_has_no_way_to_go():
     with pytest.raises(smach.InvalidTransitionError, match="'late' of state 'A'"):
         machine.run()
     assert kinds_of(machine) == [FailureKind.UNREGISTERED_OUTCOME]
+
+
+def test_an_outcome_that_leads_nowhere_is_a_failure_though_it_is_intended():
+    state = Scripted('left')
+    machine = Watched(chain_of(state), settings={'states': {'A': {'intended_outcomes': ['left']}}})
+    state.register_outcomes(['left'])
+    assert machine.run() == 'done'
+    assert kinds_of(machine) == [FailureKind.UNREGISTERED_OUTCOME]
