@@ -111,6 +111,18 @@ def test_an_interface_that_gives_something_else_than_an_answer_has_failed(wrong)
     assert [event.text for event in machine.of(EventKind.WARNING)] == [tried]
 
 
+def test_an_interface_does_the_work_of_the_state_and_nothing_else():
+    expert = FakeExpert(interface('hand'), goto('B'), interface=lambda *args: goto('B'))
+    machine = watched(
+        Scripted('aborted'),
+        Scripted(),
+        expert=expert,
+        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
+    )
+    assert machine.run() == 'done'
+    assert expert.questions[1].tried == ('interface hand: it gave GOTO, allowed: SUPERSEDE',)
+
+
 class Deaf:
     """An expert's port that does not hear that its question is taken back, and answers later."""
 
@@ -120,6 +132,7 @@ class Deaf:
         self.left = threading.Event()
 
     def __call__(self, question, cancelled, progress):
+        self.cancelled = cancelled
         self.asked.set()
         assert self.let_go.wait(20)
         progress('claimed', 'eva', 'late')
@@ -212,6 +225,7 @@ def test_what_a_port_tells_after_the_program_was_interrupted_is_no_step_of_the_n
     monkeypatch.setattr(smach, 'is_shutdown', interrupted)
     with pytest.raises(KeyboardInterrupt):
         machine.run()
+    assert deaf.cancelled.is_set(), 'nobody needs an answer any more'
     monkeypatch.setattr(smach, 'is_shutdown', lambda: False)
     assert machine.run() == 'done'
     assert not machine.of(EventKind.QUERY_CLAIMED)

@@ -72,6 +72,15 @@ def test_a_machine_that_was_wrapped_on_its_own_stays_wrapped():
     assert inner.execute() == 'ok'
 
 
+def test_such_a_machine_tells_the_observers_of_the_former_tree_nothing_more():
+    machine, inner = machine_in_machine()
+    OracleContainer.wrap(inner)
+    told = []
+    OracleContainer.wrap(machine).events.observers.append(told.append)
+    unwrap(machine)
+    assert inner.execute() == 'ok' and told == []
+
+
 def test_what_was_not_wrapped_is_refused():
     machine, inner = machine_in_machine()
     with pytest.raises(TrialError, match='was not wrapped'):

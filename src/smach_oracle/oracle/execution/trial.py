@@ -117,7 +117,6 @@ class ContainerRun(Execution):
                 _running.remove(node)
                 if not node.tree.is_parents():
                     _end_trial(node, self.outcome, error, self._store)
-                self._store = None
             elif self.outcome is None:
                 self.outcome = outcome_of_early_end(node)
 

@@ -284,7 +284,7 @@ class TreeNode:
             self.begin_trial(self.tree.trial_id)
         self.records.history.begin_execution()
         self.engine.begin_execution()
-        entry = self.tree.resumed.entry_of(self.records) if self.tree.is_resumed else None
+        entry = self.tree.resumed.entry_of(self.records)
         if entry is not None:
             entry.take_over_records()
 
