@@ -36,7 +36,7 @@ class _Shown:
     def __init__(self, name: str) -> None:
         self._name = name
 
-    def __get__(self, machine: object, owner: Optional[type] = None) -> Any:
+    def __get__(self, machine: object, owner: type) -> Any:
         return self if machine is None else getattr(oracle_of(machine), self._name)
 
 

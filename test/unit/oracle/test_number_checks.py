@@ -1,6 +1,7 @@
 """What counts as a number, for settings, rates and maps."""
 
 import math
+import sys
 
 import pytest
 
@@ -33,6 +34,8 @@ def test_a_number_from_0_to_3(value, number, whole):
     [
         (-1e308, True),
         (10**308, True),
+        (sys.float_info.max, True),
+        (-sys.float_info.max, True),
         (10**400, False),
         (math.inf, False),
         (-math.inf, False),

@@ -59,7 +59,7 @@ class _BranchMethod:
     def __init__(self, name: str) -> None:
         self._name = name
 
-    def __get__(self, stand_in: Any, owner: Optional[type] = None) -> Any:
+    def __get__(self, stand_in: Any, owner: type) -> Any:
         return self if stand_in is None else getattr(stand_in.branch_of_stand_in, self._name)
 
 

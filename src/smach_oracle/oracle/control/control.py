@@ -324,7 +324,7 @@ class Control:
                 ),
             )
 
-    def step(self, path: str = '') -> Tuple[Hold, ...]:
+    def step(self, path: str) -> Tuple[Hold, ...]:
         """Let what waits enter one state each, also what waits for a confirmation.
 
         :param path: of the container. '' means every one.
@@ -338,7 +338,7 @@ class Control:
             self._wake()
             return held
 
-    def confirm(self, path: str = '') -> Tuple[Hold, ...]:
+    def confirm(self, path: str) -> Tuple[Hold, ...]:
         """Confirm the states before which containers wait for that, and return those.
 
         :param path: of the container. '' means every one.
