@@ -159,6 +159,26 @@ def test_what_differs_somewhere_inside_is_not_the_same(one, other):
     assert not is_same(one, other) and not is_same(other, one)
 
 
+class Proxy:
+    """Says that it is of the class of what it stands for."""
+
+    def __init__(self, wrapped):
+        self.wrapped = wrapped
+
+    @property
+    def __class__(self):
+        return type(self.wrapped)
+
+    def __getattr__(self, name):
+        return getattr(self.wrapped, name)
+
+
+@pytest.mark.parametrize('one', [[ARM], (ARM,), {'a': ARM}, ARM.move])
+@pytest.mark.parametrize('other', [5, None])
+def test_proxies_of_different_kinds_are_not_the_same(one, other):
+    assert not is_same(Proxy(one), Proxy(other)) and not is_same(Proxy(other), Proxy(one))
+
+
 @pytest.mark.parametrize('make', [lambda: [ARM, 'a'], lambda: (ARM, [1]), lambda: {'a': [ARM]}])
 def test_lists_and_mappings_of_the_same_are_the_same(make):
     assert is_same(make(), make()) and is_same(ARM.move, ARM.move)

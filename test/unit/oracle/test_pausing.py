@@ -238,6 +238,10 @@ def test_a_breakpoint_that_is_gone_holds_nothing() -> None:
         assert held.end() == 'done'
     with pytest.raises(OperatorError, match='there is no breakpoint B; there are: none'):
         held.hand.remove_breakpoint('B')
+    held.hand.set_breakpoint('A')
+    held.hand.set_breakpoint('C')
+    with pytest.raises(OperatorError, match='there is no breakpoint B; there are: A, C'):
+        held.hand.remove_breakpoint('B')
 
 
 def test_a_shutdown_ends_a_pause(monkeypatch) -> None:

@@ -283,3 +283,22 @@ def test_a_machine_that_is_nested_in_one_top_machine_after_another_belongs_to_th
         assert [event.seq for event in machine.events] == list(range(len(machine.events)))
         assert machine.kinds().count('TRIAL_START') == 1 and machine.kinds()[-1] == 'TRIAL_END'
         assert set(shared.get_children()) == {'A', meta}
+
+
+def test_a_plain_machine_is_filled_through_the_containers_class():
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        OracleContainer.add('A', Scripted(), {'ok': 'done'})
+        with pytest.raises(SettingsError, match='these settings in an OracleContainer'):
+            OracleContainer.add('B', Scripted(), {'ok': 'done'}, prior=0.1)
+    assert list(machine.get_children()) == ['A']
+
+
+def test_an_initial_state_may_come_with_userdata():
+    machine = OracleContainer(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        OracleContainer.add('A', Scripted(), {'ok': 'done'})
+    given = smach.UserData()
+    given.cup = 'blue'
+    machine.set_initial_state(['A'], given)
+    assert machine.userdata.cup == 'blue'
