@@ -14,7 +14,7 @@ unreachable lost Aborted FAIL ERROR LOST_LINE lostObject grasp_failed grasp-fail
 failed_grasp failedGrasp FailedToGrasp IOError place2Failed pick_ERROR mission_abort aborted2
 failed_2 fail3 error42_code goal_unreachable unreachableGoal planning-timeout timeout_of_arm
 move.failed FAILURE: failed-in-flight not_completed not_succeeded notSucceeded task_not_completed
-not_successful unsuccessful grasp_unsuccessful ABORTED_BY_USER
+not_successful unsuccessful unsucceeded grasp_unsuccessful ABORTED_BY_USER
 """.split()
 
 OTHER = """
@@ -23,7 +23,7 @@ no_error noError NO-ERROR no_errors not_failed never_failed nothing non_failure 
 no_object no yes low failed_over failedOver fail_safe failSafe error_free error-cleared
 error_handled failure_recovered failure_resolved error_fixed timeout_ok terror TERROR unfailed
 blackboard lostness failover aboard default timer timely out retry not_completed_yet
-not_grasp_failed 2 _ -
+not_grasp_failed not_quite_completed 2 _ -
 """.split()
 
 

@@ -11,6 +11,7 @@ from smach_oracle.oracle.settings.failure_rule import (
     RULE,
     EndMeaning,
     FailureRule,
+    rule_after,
     rule_in,
 )
 
@@ -96,6 +97,7 @@ def test_a_record_gives_back_the_rule_that_it_was_given(rule):
         {'by_name': 0},
         {'by_name': True},
         {'failing_outcomes': 'aborted'},
+        {'failing_outcomes': ['aborted', 5]},
     ],
 )
 def test_a_record_that_names_no_known_rule_has_none(told):
@@ -103,7 +105,19 @@ def test_a_record_that_names_no_known_rule_has_none(told):
     assert rule_in(told) is None
 
 
+def test_a_trial_goes_on_by_the_rule_that_its_latest_record_names():
+    assert rule_after(FORMER_RULE, {RULE: BY_NAME.as_data()}) == BY_NAME
+    assert rule_after(BY_NAME, {RULE: None}) == BY_NAME
+
+
+def test_a_rule_is_told_in_words():
+    assert str(FailureRule(('lost', 'parked'))) == 'by a list: lost, parked'
+    assert str(FailureRule(())) == 'by a list: nothing'
+    assert str(FailureRule(None, 9)) == 'by name, version 9'
+
+
 def test_only_a_later_version_of_the_rule_is_not_known():
     assert FailureRule(None, BY_NAME_VERSION + 1).is_of_later_version
+    assert not FailureRule(('lost',), BY_NAME_VERSION + 1).is_of_later_version
     assert not BY_NAME.is_of_later_version and not FORMER_RULE.is_of_later_version
     assert FORMER_RULE.words == FORMER_FAILING_OUTCOMES

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+import smach
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings.health import HealthCondition, HealthKind
 from smach_oracle.oracle.settings.settings import Settings
@@ -11,6 +12,14 @@ from smach_oracle.oracle.settings.settings import Settings
 
 def is_well():
     return True
+
+
+class CalledState(smach.State):
+    """A state that is a function, too."""
+
+    def __call__(self):
+        """Say that all is well."""
+        return True
 
 
 def healthy(given, resolver=None):
@@ -50,6 +59,10 @@ def healthy(given, resolver=None):
         (
             {'diagnostics': '/Power System'},
             HealthCondition(HealthKind.DIAGNOSTICS, 'Power System', '/Power System'),
+        ),
+        (
+            {'topic': '/charge', 'at_least': 2, 'at_most': 2},
+            HealthCondition(HealthKind.TOPIC, 'charge', '/charge', at_least=2.0, at_most=2.0),
         ),
         ({'diagnostics': '/'}, HealthCondition(HealthKind.DIAGNOSTICS, '/', '/')),
         (
@@ -99,6 +112,7 @@ def test_a_function_of_a_module_is_found_by_its_name():
         ({'topic': '1st'}, 'healthy.topic', 'the name of a topic'),
         ({'topic': '/a', 'feild': 'x'}, 'healthy.feild', 'topic, field, equals, at_least'),
         ({'topic': '/a', 'field': 'a..b'}, 'healthy.field', 'a field of the message'),
+        ({'topic': '/a', 'field': 3}, 'healthy.field', 'a field of the message'),
         ({'topic': '/a', 'equals': [1]}, 'healthy.equals', 'true, false, a number or a text'),
         ({'topic': '/a', 'equals': math.nan}, 'healthy.equals', 'true, false, a number or a text'),
         ({'topic': '/a', 'equals': 1, 'at_least': 1}, 'healthy.equals', 'not both'),
@@ -115,6 +129,8 @@ def test_a_function_of_a_module_is_found_by_its_name():
         ({'function': 'my_robot.health'}, 'healthy.function', 'python:module:attribute'),
         ({'function': 'python:a:b'}, 'healthy.function', 'names cannot be imported here'),
         ({'function': 7}, 'healthy.function', 'a function without arguments'),
+        ({'function': dict}, 'healthy.function', 'a function without arguments'),
+        ({'function': CalledState()}, 'healthy.function', 'a function without arguments'),
         ({'function': is_well, 'max_age_s': 1}, 'healthy.max_age_s', 'function, name'),
         ({'function': is_well, 'name': ''}, 'healthy.name', 'a string that is not empty'),
     ],

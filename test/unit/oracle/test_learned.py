@@ -184,6 +184,15 @@ def test_a_streak_that_goes_on_knows_which_way_was_moved():
     again = Streaks()
     again.take_over(json.loads(json.dumps(streaks.told())))
     assert again.of('A', 0).so_far(0.0).moved == 'from B'
+    again.take_over({'A': streaks.told()['A'][:5]})  # by a version that moved none
+    assert again.of('A', 0).so_far(0.0).moved == ''
+
+
+def test_a_way_counts_after_failures_of_this_kind_and_of_all_kinds_if_it_has_none():
+    other = result(BACK, LATER, True, minutes=9.0, failure='another kind')
+    same = result(BACK, LATER, False)
+    assert Evidence((other, same), FAILURE).of_way(BACK.key) == (0, 1, 0.0)
+    assert Evidence((other,), FAILURE).of_way(BACK.key) == (1, 1, 9.0)
 
 
 def test_unknown_results_count_their_time_alone():

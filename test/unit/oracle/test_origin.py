@@ -14,6 +14,7 @@ from smach_oracle import __version__
 from smach_oracle.oracle import OracleContainer, Settings
 from smach_oracle.oracle.execution import origin
 from smach_oracle.oracle.execution.origin import (
+    LARGEST_INPUT,
     LONGEST_INPUT,
     MOST_INPUTS,
     inputs_of,
@@ -136,7 +137,15 @@ def test_inputs_are_the_plain_values_of_the_userdata():
     userdata.room, userdata.count, userdata.is_wet, userdata.height = 'hall', 3, True, 0.5
     userdata.long, userdata.none, userdata.places = 'x' * (LONGEST_INPUT + 1), None, [1]
     userdata.far, userdata.touchy, userdata.large = math.inf, Touchy('a'), 10**5000
+    userdata[7] = 'a key that is no word'
     assert inputs_of(userdata) == {'room': 'hall', 'count': 3, 'is_wet': True, 'height': 0.5}
+
+
+def test_inputs_may_be_as_long_and_almost_as_large_as_the_limits():
+    userdata = smach.UserData()
+    userdata.long, userdata.large = 'x' * LONGEST_INPUT, LARGEST_INPUT - 1
+    userdata.too_large = LARGEST_INPUT
+    assert inputs_of(userdata) == {'long': 'x' * LONGEST_INPUT, 'large': LARGEST_INPUT - 1}
 
 
 def test_inputs_are_few_and_those_of_no_userdata_are_none():

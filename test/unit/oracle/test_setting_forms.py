@@ -5,6 +5,7 @@ import pickle
 
 import pytest
 
+import smach
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.checks import checked_prices, named_object
@@ -26,6 +27,23 @@ def answers(name):
 @pytest.mark.parametrize('given', [('goto', 'HOME'), {'goto': 'HOME'}, 'goto:HOME'])
 def test_a_fallback_is_a_pair_a_mapping_or_a_text(given):
     assert checks.on_no_answer('on_no_answer', given) == ('goto', 'HOME')
+
+
+@pytest.mark.parametrize('given', ['stop', ('stop', ''), {'stop': None}])
+def test_to_stop_names_no_state(given):
+    assert checks.on_no_answer('on_no_answer', given) == ('stop', '')
+
+
+@pytest.mark.parametrize('given, limit', [(0, None), (None, None), (2, 2.0)])
+def test_a_time_limit_of_0_is_none(given, limit):
+    assert checks.time_limit('time_limit_s', given) == limit
+
+
+@pytest.mark.parametrize('kind', [set, frozenset])
+def test_words_of_a_set_are_sorted_and_those_of_a_list_are_as_given(kind):
+    words = 'pick place look drive lift open'.split()
+    assert checks.words('words', kind(words)) == tuple(sorted(words))
+    assert checks.words('words', words) == tuple(words)
 
 
 @pytest.mark.parametrize('given', [('goto', 'HOME', ''), ('goto', 3), 3, {}])
@@ -60,7 +78,7 @@ def test_a_name_that_is_refused_with_a_reason_keeps_it():
 
 def test_conditions_of_health_are_none_one_or_several():
     assert checked_health('healthy', None) == ()
-    assert checked_health('healthy', WrittenWord('~')) == ()
+    assert checked_health('healthy', WrittenWord('~', None)) == ()
     (one,) = checked_health('healthy', LIFTED)
     assert (one.kind, one.source) == (HealthKind.TOPIC, '/lifted')
     assert checked_health('healthy', [one, LIFTED]) == (one, one)
@@ -88,6 +106,12 @@ def test_a_precondition_may_be_checked_already_or_named():
         answers,
         'answers',
     )
+
+
+def test_a_name_may_be_that_of_a_state():
+    state = smach.State(['ok'])
+    named = parse_precondition('key', 'python:module:state', lambda name: state)
+    assert (named.kind, named.target) == (PreconditionKind.STATE, state)
 
 
 def test_a_precondition_that_names_no_function_is_refused():

@@ -167,5 +167,10 @@ def test_a_path_of_nested_that_stands_for_nothing_is_refused_with_those_there_ar
         OracleContainer.wrap(tree()[0], settings={'nested': ['ARN']})
     with pytest.raises(SettingsError, match=r"nested: 'ARMS'.*ALL/EACH, ARM, ARM/HAND, BOTH/LEFT"):
         OracleContainer.wrap(tree()[0], settings={'nested': ['ARMS']})
+    flat = smach.StateMachine(['ok'])
+    with flat:
+        smach.StateMachine.add('A', Scripted('ok'))
+    with pytest.raises(SettingsError, match='Concurrences and Iterators: none'):
+        OracleContainer.wrap(flat, settings={'nested': ['ARM']})
     with pytest.raises(SettingsError, match='true, false, or a list'):
         Settings.from_dict({'nested': 'ARM'})

@@ -148,9 +148,9 @@ def test_the_file_that_shows_the_settings_has_their_defaults():
             'PACKAGE/FILE.launch',
         ),
         (
-            {'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}},
+            {'interfaces': {'hand': {'action': 'a', 'launch': '../f.launch'}}},
             'interfaces.hand.launch',
-            'p/../f.launch',
+            '../f.launch',
             'PACKAGE/FILE.launch',
         ),
         (
@@ -170,6 +170,18 @@ def test_the_file_that_shows_the_settings_has_their_defaults():
             'interfaces.hand.args.x',
             [1],
             'launch argument',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'launch': 'p/f.launch', 'args': {'x y': 1}}}},
+            'interfaces.hand.args.x y',
+            1,
+            'launch argument',
+        ),
+        (
+            {'interfaces': {'hand': {'action': 'a', 'launch': '../f.launch'}}},
+            'interfaces.hand.launch',
+            '../f.launch',
+            'PACKAGE/FILE.launch',
         ),
         (
             {'interfaces': {'hand': {'action': 'a', 'node': 'p t', 'start_limit_s': 0}}},

@@ -93,10 +93,11 @@ def way_in_words(key: str) -> str:
     kind, what = parts_of(key)
     if kind is WayKind.STEP_BACK:
         return 'going back to ' + what
-    return 'trying it again' + {
+    behind: Mapping[Optional[WayKind], str] = {
         WayKind.PREPARE: ' after its preconditions',
         WayKind.WAIT: ' after ' + what,
-    }.get(kind or WayKind.AGAIN, '')
+    }
+    return 'trying it again' + behind.get(kind, '')
 
 
 class StreakSoFar(NamedTuple):
@@ -156,9 +157,9 @@ class Evidence(NamedTuple):
 class WayCounts(NamedTuple):
     """The times that a way has helped, of how many, and the mean time that it took then."""
 
-    helped: int = 0
-    tried: int = 0
-    minutes: float = 0.0
+    helped: int
+    tried: int
+    minutes: float
 
     @property
     def share(self) -> float:

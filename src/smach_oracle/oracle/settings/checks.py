@@ -126,7 +126,7 @@ def words(key: str, value: object) -> Tuple[str, ...]:
 
     :raises SettingsError: for anything else.
     """
-    if isinstance(value, str) or not isinstance(value, (list, tuple, set, frozenset)):
+    if not isinstance(value, (list, tuple, set, frozenset)):
         raise SettingsError(key, value, 'a list of strings')
     found = []
     for entry in value:

@@ -142,17 +142,18 @@ class Groups:
             yield GivenSetting(short.name, group, value)
             return
         alone: Dict[str, object] = {}
-        is_one = short is not None and any(mark in value for mark in short.marks)
+        name, marks = (short.name, short.marks) if short else ('', ())
+        is_one = any(mark in value for mark in marks)
         for key, each in checks.mapping(group, value).items():
             if key in members:
                 yield GivenSetting(members[key].name, '{}.{}'.format(group, key), each)
             elif is_one:
                 alone[key] = each
             else:
-                allowed = [*members, *(short.marks if short else ())]
+                allowed = [*members, *marks]
                 raise no_such('{}.{}'.format(group, key), each, allowed, self.hint(key, group))
-        if short is not None and alone:
-            yield GivenSetting(short.name, group, alone)
+        if alone:
+            yield GivenSetting(name, group, alone)
 
     def _allowed(self, group: str) -> str:
         keys = 'a mapping with some of the keys ' + ', '.join(self._members[group])

@@ -119,7 +119,7 @@ class UnfitName(NamedTuple):
 
     error: SettingsError
     name: str
-    kind: UnfitKind = UnfitKind.NAME
+    kind: UnfitKind
 
 
 # True: such a name is an error. False: it is a warning. A function decides about each one

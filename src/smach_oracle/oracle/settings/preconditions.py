@@ -94,7 +94,7 @@ def parse_precondition(
         return _parse_pair(key, [given['check'], given['achieve']], resolver)
     if isinstance(given, (tuple, list)) and len(given) == 2:
         return _parse_pair(key, list(given), resolver)
-    if callable(given) and not (isinstance(given, type) and is_state(given)):
+    if callable(given) and not is_state(given):
         return PreconditionSpec(PreconditionKind.CALLABLE, name_of(given), given)
     raise no_name(key, given, _ALLOWED)
 

@@ -401,7 +401,7 @@ def _refuse_unknown(
 
 def _hint(prefix: str, key: str) -> str:
     """Say where the key belongs, or which one may be meant."""
-    if not prefix and key == 'preconditions':
+    if key == 'preconditions':
         return ' here (it belongs to a state: below states: LABEL:)'
     if not prefix:
         return GROUPS.hint(key)

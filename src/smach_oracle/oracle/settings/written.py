@@ -13,7 +13,7 @@ class WrittenWord(str):
 
     value: Optional[bool]
 
-    def __new__(cls, text: str, value: Optional[bool] = None) -> 'WrittenWord':
+    def __new__(cls, text: str, value: Optional[bool]) -> 'WrittenWord':
         """Make one of its text and its value."""
         word = super().__new__(cls, text)
         word.value = value
