@@ -45,9 +45,9 @@ class StateProspect(NamedTuple):
     outcomes: Tuple[OutcomeProspect, ...]
     actions: Actions
     offers: Tuple[InterfaceOffer, ...]
-    before: Tuple[str, ...] = ()
-    kinds: Tuple[WayKind, ...] = ()
-    not_before: Tuple[str, ...] = ()
+    before: Tuple[str, ...]
+    kinds: Tuple[WayKind, ...]
+    not_before: Tuple[str, ...]
 
 
 class ContainerProspect(NamedTuple):
@@ -68,9 +68,9 @@ class ContainerProspect(NamedTuple):
     is_top: bool
     recovers: bool
     states: Tuple[StateProspect, ...]
-    guarded: Tuple[str, ...] = ()
-    has_branches: bool = False
-    unknown_ends: Tuple[str, ...] = ()
+    guarded: Tuple[str, ...]
+    has_branches: bool
+    unknown_ends: Tuple[str, ...]
 
 
 # -- the ways on which no guarded state (`on_retry`) is executed, as they are drawn

@@ -299,9 +299,7 @@ class _Setting:
                 node.records, EntryPoint(node, stored, self._way_down(node, stored))
             )
         record = node.record(stored.label)
-        # a question of an earlier moment may have been answered since: it is asked again
-        if stored.asked and stored.asked[0] == stored.label and not self._resumption.is_earlier:
-            self._resumed.reopen(record, stored.asked[1])
+        self._reopen(record, stored)
         if stored.phase == FAILED or self._resumed.has_question(record):
             self._resumed.go_on_with(record, self._unfinished(node, stored))
         elif stored.phase == IN:
@@ -309,6 +307,13 @@ class _Setting:
         else:
             self.ask_at([TreePlace(node, stored.label)])
         return True
+
+    def _reopen(self, record: StateRecord, stored: StoredContainer) -> None:
+        """Have the question about a state, if one was open, go on as the same one."""
+        asked = stored.asked
+        # one of an earlier moment may have been answered since: it is asked again
+        if asked and asked[0] == record.label and not self._resumption.is_earlier:
+            self._resumed.reopen(record, asked[1])
 
     def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
         """Set what is in a state that was under way, or say that it is in doubt."""
@@ -378,12 +383,11 @@ class _Setting:
             self._ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
-        stood.at, asked, at = [way.first_label, BEFORE], stored.asked, stored.at_there
+        stood.at, at = [way.first_label, BEFORE], stored.at_there
         self._resumed.enter_at(top.records, EntryPoint(top, stood, way.entered_places[1:]))
         there = StoredContainer(at)
         record = place.node.record(place.label)
-        if asked and asked[0] == place.label and not self._resumption.is_earlier:
-            self._resumed.reopen(record, asked[1])
+        self._reopen(record, stored)
         if there.phase == IN:
             self._go_on_in(place.node, there, record)
         elif there.phase == FAILED or self._resumption.asks:

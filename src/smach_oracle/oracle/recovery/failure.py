@@ -183,9 +183,10 @@ def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
 def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
     """Return the failure of a visit that was begun before the program was stopped."""
     failure = Failure(label, before.kind, before.outcome, before.text)
-    route = route_of(node.machine, label, before.outcome) if before.outcome else Route('', False)
-    if route.target:
-        return failure._replace(route=route)
+    if before.outcome:
+        route = route_of(node.machine, label, before.outcome)
+        if route.target:
+            return failure._replace(route=route)
     raises_none = (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT, FailureKind.HELD_BACK)
     if before.kind in raises_none:
         return failure

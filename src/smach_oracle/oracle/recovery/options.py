@@ -162,9 +162,8 @@ def _why_blocked(recovery: Recovery, each: OpenWay, why_not_above: WhyNotAbove) 
 
 def why_closed(recovery: Recovery, option: Option) -> str:
     """Say that a place, or one on the way down, is closed, or '' where it is not."""
-    if not option.closed:
-        return ''
-    return closed_in_words(option.jump_path, option.closed, named(recovery, option.jump_path))
+    way, closed = option.jump_path, option.closed
+    return closed and closed_in_words(way, closed, named(recovery, way))
 
 
 def why_repeats(recovery: Recovery, option: Option) -> str:

@@ -70,9 +70,7 @@ def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
     if recovery.stopped():
         return recovery.preempted()
     verdict = _obey(recovery, answer)
-    closed = ''
-    if answer.kind is AnswerKind.GOTO and isinstance(verdict, JumpTo):
-        closed = why_closed_on(verdict.jump_path)
+    closed = why_closed_on(verdict.jump_path) if isinstance(verdict, JumpTo) else ''
     if not closed:
         return verdict
     recovery.ask_at_once(

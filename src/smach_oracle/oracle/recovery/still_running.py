@@ -115,12 +115,10 @@ class WatchedVisit:
                 target=self._ask, name='smach_oracle still running', daemon=True
             ).start()
 
-    def _ask(self) -> None:
-        if self._asks_again():
-            self._ask_at(self._time.now() + self._ran_s())  # once it has run twice as long
+    def _ask_later(self) -> None:
+        self._ask_at(self._time.now() + self._ran_s())  # once it has run twice as long
 
-    def _asks_again(self) -> bool:
-        """Ask. Return whether to do so again, if it runs on."""
+    def _ask(self) -> None:
         node, failure = self._node, self._failure()
         scope = Scope(node.execution.scope)
         recovery = Recovery(node, self._record, still_running(failure), scope=scope)
@@ -129,14 +127,14 @@ class WatchedVisit:
         with self._lock:
             self._recovery = recovery
             if self._ended.is_set():
-                return False
+                return
         if recovery.stopped():
-            return False
+            return
         expert, budget = node.tree.expert if node.in_force.policy.asks else None, recovery.budget
         spent = '' if expert is None else budget.why_over() or budget.take_question()
         if expert is None or spent:
             self._warn(failure.text + (' Nobody is asked: ' + spent if spent else ''))
-            return False
+            return
         # the state runs on, and so do the time limits around it. Whoever looks whether a state
         # around still runs has its answer in this question
         watched = [run for run in node.execution.runs_around if run.limit_s is None]
@@ -146,17 +144,17 @@ class WatchedVisit:
             if not self._ended.is_set():
                 node.tree.early_end.end_at_shutdown()
                 self._close(recovery, EventKind.QUERY_CANCELLED, recovery.why_taken_back())
-            return False
-        if answer is None:
+        elif answer is None:
             why_over = budget.why_over()
             why = '; '.join(filter(None, (recovery.why_no_answer, why_over)))
             self._close(recovery, EventKind.QUERY_EXPIRED, why + '; it runs on')
-            return not why_over
-        if self._is_wait_on(answer):
+            if not why_over:
+                self._ask_later()
+        elif self._is_wait_on(answer):
             smach.loginfo('{}: {} waits on'.format(self._place(), answer.by or 'the expert'))
-            return True
-        self._take_out(answer)
-        return False
+            self._ask_later()
+        else:
+            self._take_out(answer)
 
     def _is_wait_on(self, answer: Answer) -> bool:
         return (
