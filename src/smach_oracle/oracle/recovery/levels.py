@@ -124,10 +124,9 @@ def runs_as_precondition(node: TreeNode) -> bool:
     child, above = node, node.parent
     while above is not None:
         state = states_of(above.machine).get(child.labels_from_parent[0])
-        label = current_label_of(above.machine)
         if above.tree.is_precondition(above, state):
             return True
-        if is_executing(above.machine) and label and above.is_oracle(label):
+        if is_executing(above.machine) and above.is_oracle(current_label_of(above.machine)):
             return True
         if not is_executing(above.machine) or current_state_of(above.machine) is not state:
             return False

@@ -60,7 +60,7 @@ def is_nested_at(nested: Nested, path: str) -> bool:
 
 def matches(name: str, path: str) -> bool:
     """Whether a name stands for the state or container of a path. '' is the top machine's."""
-    label = path.rsplit('/', 1)[-1]
+    label = path.rpartition('/')[2]
     if name in (path, label):
         return True
     if not is_pattern(name):
