@@ -55,6 +55,12 @@ def test_words_of_a_user_are_the_only_ones(name):
     assert 'lineLost' in names
 
 
+def test_a_word_of_a_user_follows_a_change_to_its_capital_only_if_it_begins_with_a_letter():
+    assert 'statusE2' in FailingNames(['e2'])
+    assert 'x2bad' not in FailingNames(['2bad'])
+    assert 'x_2bad' in FailingNames(['2bad'])
+
+
 def test_no_words_of_a_user_are_none():
     assert 'failed' not in FailingNames([])
 

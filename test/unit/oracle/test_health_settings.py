@@ -53,6 +53,10 @@ def healthy(given, resolver=None):
             ),
         ),
         (
+            {'topic': '/gear', 'at_least': 2, 'at_most': 2},
+            HealthCondition(HealthKind.TOPIC, 'gear', '/gear', at_least=2.0, at_most=2.0),
+        ),
+        (
             {'topic': '/mode', 'equals': 'run'},
             HealthCondition(HealthKind.TOPIC, 'mode', '/mode', equals='run'),
         ),

@@ -270,6 +270,8 @@ def test_where_moved_ways_disappoint_it_goes_back_and_says_so():
         choice = Learned().choose(situation(before + moved))
         assert choice.hoped is None
         assert 'helped 0 of 5 times, and 4.5 were expected' in choice.remark
+    barely = [result(BACK, FIRST, number < 1, hoped=0.5) for number in range(16)]
+    assert 'helped 1 of 16 times' in Learned().choose(situation(barely)).remark
 
 
 @pytest.mark.parametrize(
@@ -278,8 +280,14 @@ def test_where_moved_ways_disappoint_it_goes_back_and_says_so():
         [result(BACK, FIRST, False, hoped=0.9)] * 4 + [result(BACK, FIRST, None, hoped=0.9)],
         [result(BACK, FIRST, True, hoped=1.0)] * 5,
         [result(BACK, FIRST, number < 2, hoped=0.8) for number in range(5)],
+        [result(BACK, FIRST, number < 2, hoped=0.5) for number in range(16)],
     ],
-    ids=['four are known', 'as expected', 'hardly below what was expected'],
+    ids=[
+        'four are known',
+        'as expected',
+        'hardly below what was expected',
+        'three standard errors below it',
+    ],
 )
 def test_it_does_not_go_back_where_they_do_not_surely_disappoint(moved):
     assert not Learned().choose(situation(moved)).remark

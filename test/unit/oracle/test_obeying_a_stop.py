@@ -5,6 +5,7 @@ import threading
 import pytest
 from guarded_machines import OUTCOMES
 from held_machines import LIMIT_S, Gate, Held, Trail, eventually
+from machines import FakeExpert, Scripted, Watched, waits
 from waiting import wait_for
 
 import smach
@@ -318,3 +319,22 @@ def test_a_machine_that_is_entered_for_its_clean_up_is_no_work_though_it_has_run
         held.hand.preempt()
         assert held.end() == 'aborted'
     assert trail.ran == ['X', 'BACK', 'CLEAN']
+
+
+def test_a_preempt_is_not_obeyed_by_what_its_author_drew_after_a_failure():
+    """The machine goes on, as it has no other way, and the request stays."""
+
+    def ask(question, cancelled, progress):
+        watched.machine.request_preempt()
+        return waits(question, cancelled, progress)
+
+    outcomes = ('ok', 'aborted')
+    machine = machine_of(
+        ('done', 'aborted'),
+        A=(Scripted('aborted', outcomes=outcomes), {'ok': 'done', 'aborted': 'B'}),
+        B=(Scripted(outcomes=outcomes), {'ok': 'done'}),
+    )
+    settings = {'max_recoveries': 0, 'author_recoveries': 'override'}
+    watched = Watched(machine, expert=FakeExpert(ask), settings=settings)
+    assert watched.run() == 'done' and watched.visits() == ['A', 'B']
+    assert watched.machine.preempt_requested()

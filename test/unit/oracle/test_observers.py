@@ -154,3 +154,12 @@ def test_a_trial_that_ends_after_a_fault_of_the_store_is_over(tmp_path, log, mon
         begun = []
         assert machine_of(begun.append, 'A', 'B', checkpoint=store).execute() == 'ok'
         assert begun == ['A', 'B']
+
+
+def test_before_the_first_event_the_number_of_the_last_one_is_below_0():
+    machine = machine_of(lambda label: None, 'LOOK')
+    assert machine.events.last_seq == -1
+    seen = []
+    machine.events.observers.append(seen.append)
+    machine.execute()
+    assert machine.events.last_seq == seen[-1].seq == len(seen) - 1

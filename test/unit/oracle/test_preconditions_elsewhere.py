@@ -4,7 +4,7 @@ import threading
 
 import pytest
 from guarded_machines import OUTCOMES, both, chain
-from machines import FakeExpert, Scripted, Watched, give_up, in_thread, supersede
+from machines import FakeExpert, Scripted, Watched, contents, give_up, in_thread, supersede
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
@@ -352,3 +352,29 @@ def test_a_branch_that_names_itself_by_its_label_alone_names_no_state():
     )
     with pytest.raises(SettingsError, match="LEFT'.*: there is no such state"):
         Watched(machine, settings={'states': {'BOTH/LEFT': {'preconditions': ['LEFT']}}})
+
+
+def test_what_an_unmet_one_of_a_container_around_wrote_is_taken_back():
+    look = Scripted(
+        'ok',
+        lambda state, ud: (setattr(ud, 'x', 2), setattr(ud, 'y', 3), 'aborted')[2],
+        output_keys=['x', 'y'],
+    )
+    top = chain(LOOK=look, PICK=chain(GRASP=Scripted('aborted')))
+    top.userdata.x = 1
+    machine = wrapped(top, 'GRASP', '/LOOK')
+    assert machine.run() == 'done' and look.runs == 2
+    assert contents(machine.machine.userdata) == {'x': 1}
+
+
+def test_a_machine_that_a_precondition_executes_by_hand_asks_nobody():
+    hand = chain(CLOSE=Scripted('aborted'))
+    machine = Watched(
+        chain(PICK=Scripted('aborted'), HAND=hand),
+        expert=FakeExpert(supersede('ok')),
+        preconditions={'PICK': [lambda userdata: hand.execute() == 'done']},
+        settings={'states': {'CLOSE': {'max_recoveries': 0}}},
+    )
+    assert machine.run() == 'done'
+    assert [event.outcome for event in machine.of(EventKind.PRECONDITION_END)] == ['not met']
+    assert not machine.of(EventKind.QUERY_OPENED)

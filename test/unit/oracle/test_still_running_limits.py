@@ -203,3 +203,65 @@ def test_a_state_that_is_answered_and_then_taken_away_is_an_error():
     machine = asked(Scripted('aborted', take_away), Scripted(), expert=FakeExpert(goto('B')))
     with pytest.raises(smach.InvalidStateError, match='there is no way to SM_ROOT/B'):
         machine.run()
+
+
+def test_a_preempt_ends_the_wait_until_the_robot_is_well_for_what_was_answered():
+    health = FakeHealth()
+
+    def ask(question, cancelled, progress):
+        health.now = 'motors: off'
+        return goto('B')
+
+    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(ask), health=health)
+    run = in_thread(machine.run)
+    assert wait_for(lambda: machine.of(EventKind.HEALTH_WAIT_START))
+    machine.machine.request_preempt()
+    assert run.result() == 'preempted' and machine.visits() == ['A', 'A']
+
+
+def taken_out(then, clock, **settings):
+    """A, which still runs as an expert sends it to B. `then`: called once A has ended."""
+
+    def runs_long(state, ud):
+        clock.advance(1.0)
+        return Gate()(state, ud)
+
+    machine = asked(
+        Scripted('aborted', runs_long),
+        Scripted(),
+        expert=FakeExpert(goto('B')),
+        budget={'minutes': 1},
+        **settings,
+    )
+
+    def observe(event):
+        if event.kind is EventKind.TRANSITION and len(machine.visits()) == 2:
+            then(machine.machine)
+
+    machine.machine.events.observers.append(observe)
+    return machine
+
+
+def test_a_shutdown_as_the_state_is_taken_out_goes_before_the_answer_and_the_minutes(
+    clock, monkeypatch
+):
+    def then(top):
+        clock.advance(61.0)
+        monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
+
+    machine = taken_out(then, clock)
+    assert machine.run() == 'preempted' and machine.visits() == ['A', 'A']
+
+
+def test_where_the_minutes_are_over_nobody_is_asked_about_a_place_that_has_closed(
+    clock, monkeypatch
+):
+    closed = []
+    monkeypatch.setattr(places, 'why_closed', lambda node, label: 'is closed' if closed else '')
+    machine = taken_out(closed.append, clock, on_no_answer={'give_up': 'done'})
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.WARNING and clock.advance(61.0)
+    )
+    assert machine.run() == 'aborted'
+    (ending,) = machine.of(EventKind.GIVE_UP)
+    assert ending.text.endswith(': the machine ends as without an oracle')

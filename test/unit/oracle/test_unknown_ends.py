@@ -93,6 +93,17 @@ def nested(leads_to):
     return top
 
 
+def test_of_a_concurrence_no_end_is_told():
+    concurrence = smach.Concurrence(['done', 'left'], default_outcome='left')
+    with concurrence:
+        smach.Concurrence.add('LIFT', Scripted('aborted'))
+    top = smach.StateMachine(['succeeded', 'aborted'])
+    with top:
+        ways = {'done': 'succeeded', 'left': 'succeeded'}
+        smach.StateMachine.add('BOTH', concurrence, ways)
+    assert of(top) == {'TOP': (), 'TOP/BOTH': ()}
+
+
 @pytest.mark.parametrize('leads_to, ends', [('succeeded', ('left',)), ('aborted', ())])
 def test_of_a_nested_machine_an_end_is_told_that_hides_a_failure(leads_to, ends):
     assert of(nested(leads_to)) == {'TOP': (), 'TOP/CARRY': ends}

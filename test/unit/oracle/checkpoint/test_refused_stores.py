@@ -94,3 +94,18 @@ def test_a_store_that_cannot_be_written_is_found_out_when_it_is_opened(tmp_path)
         finally:
             os._exit(code)
     assert os.waitpid(child, 0)[1] == 0
+
+
+def open_files(path):
+    """The names below a path that this process has open."""
+    links = (os.path.join('/proc/self/fd', number) for number in os.listdir('/proc/self/fd'))
+    return [name for name in map(os.path.realpath, links) if name.startswith(str(path))]
+
+
+def test_a_store_is_closed_as_its_trial_ends_and_where_it_is_refused(tmp_path):
+    machine = wrapped(tmp_path / 'robot.db', [])
+    assert machine.execute() == 'succeeded'
+    assert not open_files(tmp_path)
+    with pytest.raises(SettingsError) as caught:
+        wrapped(tmp_path / 'robot.db', [], resume_from=7).execute()
+    assert caught.value.key == 'checkpoint.from' and not open_files(tmp_path)

@@ -1,12 +1,14 @@
 """Killed as it tries one way after the other, a machine goes on with those that are left."""
 
 import json
+import os
 import sqlite3
 
 import pytest
-from killed_machines import KilledMachine, Noted
+from killed_machines import KilledMachine, Noted, in_a_process
 from killed_trees import make
 from left_stores import Left
+from machines import Scripted, Watched, chain_of
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -181,3 +183,21 @@ def test_a_jump_stores_the_streaks_around_the_failed_state_and_looks_at_no_other
     assert machine.execute() == 'succeeded'
     assert [way for way, _ in stored] == ['again', 'wait 0.001 s', 'from /HOME']
     assert all(paths == {'TOP', 'TOP/GET'} for _, paths in stored), stored
+
+
+def test_a_state_that_was_interrupted_has_tried_nothing_yet(tmp_path):
+    def begin(pick):
+        machine = Watched(
+            chain_of(Scripted(pick)),
+            settings={
+                'policy': 'escalating',
+                'checkpoint': str(tmp_path / 'robot.db'),
+                'checkpoint_synchronous': 'OFF',
+                'on_resume': 'recover',
+            },
+        )
+        machine.run()
+        return [event.data['streak'] for event in machine.of(EventKind.DECISION)]
+
+    assert in_a_process(lambda: begin(lambda state, ud: os.kill(os.getpid(), 9))) is None
+    assert begin('ok') == [{'tried': (), 'attempts': 0, 'minutes': 0.0, 'moved': ''}]
