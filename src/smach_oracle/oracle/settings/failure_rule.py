@@ -59,7 +59,7 @@ class FailureRule(NamedTuple):
     @property
     def is_of_later_version(self) -> bool:
         """Whether this version does not know it, and uses its own instead."""
-        return self.version > BY_NAME_VERSION
+        return self.words is None and self.version > BY_NAME_VERSION
 
     def meaning(self, end: str) -> EndMeaning:
         """Return what it means that a machine has ended in this outcome.
