@@ -124,7 +124,7 @@ class ContainerFacts:
             state, outcome, result = visits[number - total]
             # as many names as visits are kept, so that the store does not grow with each
             yield from self._if_new(
-                '{}{}'.format(VISIT, number % (visits.maxlen or 1)),
+                '{}{}'.format(VISIT, number % cast(int, visits.maxlen)),
                 [state, outcome, int(result), self._execution, number],
             )
         self._visits = total

@@ -280,11 +280,7 @@ class _Setting:
         """
         stored = self._resumption.tree.container(node.key)
         key = '{}/{}'.format(node.key, stored.label)
-        if (
-            not stored.moved_to
-            and stored.phase == IN
-            and all(one.key != key for one in self._nodes)
-        ):
+        if stored.phase == IN and all(one.key != key for one in self._nodes):
             moved = self._resumption.tree.container(key)  # the container that was left is gone
         else:
             moved = stored

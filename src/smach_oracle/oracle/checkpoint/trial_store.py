@@ -181,7 +181,7 @@ class TrialStore:
         return number
 
     def _resumption(
-        self, trial: StoredTrial, tree: StoredTree, moments: List[StoredMoment], earlier: int = 0
+        self, trial: StoredTrial, tree: StoredTree, moments: List[StoredMoment], earlier: int
     ) -> Resumption:
         """Return how a trial goes on. `tree`: what its last moment says."""
         in_doubt = is_in_doubt(moments)
