@@ -185,6 +185,6 @@ def _why_not(way: Optional[JumpPath], jump: Jump) -> str:
         return 'there is no such state'
     prospect = _prospect_on(way, jump.written)
     unconfirmed = sorted(set(prospect.repeats).difference(jump.repeats))
-    if unconfirmed and not prospect.why_not:
+    if unconfirmed:  # none where it cannot be entered
         return 'it may repeat {}, which nobody has confirmed'.format(', '.join(unconfirmed))
     return prospect.why_not

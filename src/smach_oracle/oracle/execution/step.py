@@ -75,7 +75,7 @@ class Step:
         self._machine = node.machine
         self._record = record
 
-    def ended(self, outcome: object, error: Optional[Exception] = None) -> Optional[str]:
+    def ended(self, outcome: object, error: Optional[Exception]) -> Optional[str]:
         """Go on after the state has ended, through the oracle where it failed.
 
         It returns the container's outcome, or None where the machine goes on.
@@ -107,8 +107,8 @@ class Step:
                 return self._ended_by_answer(outcome)
             outcome, error = outcome.outcome, outcome.error
         judged = judge(node, record, outcome, error)
-        if isinstance(outcome, Unfinished) and isinstance(judged, Failure):
-            return self._unfinished(judged, outcome)
+        if isinstance(outcome, Unfinished):
+            return self._unfinished(cast(Failure, judged), outcome)
         reason = node.execution.scope.reason
         stopping = reason is not None or ends_program(error)
         # a request that comes from here on has come after the end of the state
