@@ -221,6 +221,27 @@ def test_after_an_error_in_getting_an_item_those_before_are_finished(to, told, d
     assert warnings[1:] == [*told, 'goes on with item 3, which is repeated']
 
 
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')),
+    reason="upstream's Iterator takes an error for the end of the items",
+)
+def test_an_error_as_the_items_are_got_again_loses_none_of_them():
+    def items():
+        calls.append(1)
+        for item in (1, 2, 3):
+            if (len(calls), item) in ((1, 3), (2, 1)):
+                raise ValueError('dropped')
+            yield item
+
+    calls, each = [], Item(outcomes=('ok', 'stuck', 'preempted'))
+    machine = chain(FIRST=Scripted(), ALL=iterator_over(each, items, **TO_ABORTED))
+    machine.userdata.done = []
+    expert = FakeExpert(goto('ALL', container='TOP'), goto('ALL', container='TOP'))
+    watched = Watched(machine, name='TOP', expert=expert, settings=ASKS)
+    assert watched.run() == 'done'
+    assert watched.machine.userdata.done == [1, 2, 3] and len(expert.questions) == 2
+
+
 def test_the_count_of_items_is_not_told_once_there_are_more():
     def grows(state, ud):
         items.append(2)

@@ -80,10 +80,10 @@ class TrackedItems:
         self._count = len(source) if isinstance(source, Sized) else None
         self.is_finished, self.is_exhausted = True, False
         self._is_pending, self._error = False, None
-        passed, self.begins_with = max(0, self.begins_with - 1), 1
+        passed = max(0, self.begins_with - 1)
         for _ in range(passed):
             next(self._items, None)
-        self.number = passed
+        self.number, self.begins_with = passed, 1
         if passed:
             self._tell('goes on with item {}'.format(passed + 1))
 
@@ -123,9 +123,9 @@ class TrackedItems:
         if items is self._items:
             self._tell('what it goes through can be iterated only once, and has raised an error')
             raise cast(Exception, self._error)
-        self._items, self._error = items, None
         for _ in range(self.number):
-            next(self._items, None)
+            next(items, None)  # it may raise again: the next time begins here once more
+        self._items, self._error = items, None
 
     def _hand_out(self) -> Iterator[object]:
         again = [self._item] if self._is_pending else []

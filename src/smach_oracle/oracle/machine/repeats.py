@@ -93,10 +93,9 @@ def _reached_from(node: TreeNode, target: str) -> Set[str]:
         label = waiting.pop()
         reached.add(label)
         following = set(transitions_of(node.machine).get(label, {}).values())
+        states = states_of(node.machine)
         waiting.update(
-            each
-            for each in list(states_of(node.machine))
-            if each in following and each not in reached and not node.is_oracle(each)
+            each for each in following - reached if each in states and not node.is_oracle(each)
         )
     return reached
 

@@ -126,14 +126,17 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
     tests = [each for each in reaches if each.lines & wanted]
     path = copy.folder / below / mutant.module
     original = path.read_text('utf-8')
-    path.write_text(mutant.applied(original), 'utf-8')
     took_s = 0.0
     try:
         for run in _in_runs(tests):
+            path.write_text(mutant.applied(original), 'utf-8')
             verdict, run_s = _verdict_of(copy, run)
             took_s += run_s
-            if verdict:
-                return Trial(mutant, verdict, copy.first_failed(), len(tests), took_s)
+            by = copy.first_failed()
+            path.write_text(original, 'utf-8')
+            # tests that were never together before may disturb each other
+            if verdict and not _verdict_of(copy, run)[0]:
+                return Trial(mutant, verdict, by, len(tests), took_s)
     finally:
         path.write_text(original, 'utf-8')
     return Trial(mutant, 'survived' if tests else 'unreached', '', len(tests), took_s)
@@ -160,12 +163,14 @@ def _verdict_of(copy: Copy, tests: Sequence[Reach]) -> Tuple[str, float]:
     What fails once and then passes has failed for another reason.
     """
     limit_s = SPARE_S + SLOWER * sum(each.took_s for each in tests)
+    named = [each.test for each in tests]
     took_s, failed = 0.0, 0
     for _ in range(ATTEMPTS):
         try:
-            ending = copy.run([each.test for each in tests], limit_s, {})
-        except TestsNotRun:  # a module does not load any more
-            return 'killed', took_s
+            ending = copy.run(named, limit_s, {})
+        except TestsNotRun:  # a module does not load, or its tests have other names
+            named = sorted({each.file for each in tests})
+            ending = copy.run(named, MEASURING_S, {})
         took_s += ending.took_s
         if ending.is_hung:
             return 'hung', took_s
