@@ -170,6 +170,16 @@ def watched(*states: Any, outcomes=('done', 'aborted', 'preempted'), **wrap: Any
     return Watched(chain_of(*states, outcomes=outcomes), **wrap)
 
 
+def offered_hand(expert: Any) -> Watched:
+    """A, which fails and has the interface `hand` on offer, and B."""
+    return watched(
+        Scripted('aborted'),
+        Scripted(),
+        expert=expert,
+        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
+    )
+
+
 class Gate:
     """Lets a state wait for a test and a test for a state."""
 

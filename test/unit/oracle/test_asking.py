@@ -15,6 +15,7 @@ from machines import (
     goto,
     in_thread,
     interface,
+    offered_hand,
     supersede,
     waits,
     watched,
@@ -323,12 +324,7 @@ def test_an_interface_supersedes_the_state_with_what_it_returns():
 
 def test_after_an_interface_that_fails_the_expert_is_asked_again_and_told():
     expert = FakeExpert(interface('hand'), goto('B'))
-    machine = watched(
-        Scripted('aborted'),
-        Scripted(),
-        expert=expert,
-        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
-    )
+    machine = offered_hand(expert)
     assert machine.run() == 'done'
     assert expert.questions[1].tried == ('interface hand: failed',)
 

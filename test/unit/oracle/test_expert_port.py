@@ -13,6 +13,7 @@ from machines import (
     goto,
     in_thread,
     interface,
+    offered_hand,
     supersede,
     watched,
 )
@@ -98,12 +99,7 @@ def test_an_answer_of_the_wrong_type_is_refused_and_asked_again(wrong):
 )
 def test_an_interface_that_gives_something_else_than_an_answer_has_failed(wrong):
     expert = FakeExpert(interface('hand'), goto('B'), interface=lambda *args: wrong)
-    machine = watched(
-        Scripted('aborted'),
-        Scripted(),
-        expert=expert,
-        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
-    )
+    machine = offered_hand(expert)
     assert machine.run() == 'done'
     assert len(expert.questions) == 2
     (tried,) = expert.questions[1].tried
@@ -113,12 +109,7 @@ def test_an_interface_that_gives_something_else_than_an_answer_has_failed(wrong)
 
 def test_an_interface_does_the_work_of_the_state_and_nothing_else():
     expert = FakeExpert(interface('hand'), goto('B'), interface=lambda *args: goto('B'))
-    machine = watched(
-        Scripted('aborted'),
-        Scripted(),
-        expert=expert,
-        settings={'max_recoveries': 0, 'interfaces': {'hand': {'action': 'hand/assist'}}},
-    )
+    machine = offered_hand(expert)
     assert machine.run() == 'done'
     assert expert.questions[1].tried == ('interface hand: it gave GOTO, allowed: SUPERSEDE',)
 

@@ -64,10 +64,6 @@ def healthy(given, resolver=None):
             {'diagnostics': '/Power System'},
             HealthCondition(HealthKind.DIAGNOSTICS, 'Power System', '/Power System'),
         ),
-        (
-            {'topic': '/charge', 'at_least': 2, 'at_most': 2},
-            HealthCondition(HealthKind.TOPIC, 'charge', '/charge', at_least=2.0, at_most=2.0),
-        ),
         ({'diagnostics': '/'}, HealthCondition(HealthKind.DIAGNOSTICS, '/', '/')),
         (
             {'diagnostics': 'Power', 'worst': 'ok', 'max_age_s': 2, 'name': 'power'},

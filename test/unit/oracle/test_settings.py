@@ -148,9 +148,9 @@ def test_the_file_that_shows_the_settings_has_their_defaults():
             'PACKAGE/FILE.launch',
         ),
         (
-            {'interfaces': {'hand': {'action': 'a', 'launch': '../f.launch'}}},
+            {'interfaces': {'hand': {'action': 'a', 'launch': 'p/../f.launch'}}},
             'interfaces.hand.launch',
-            '../f.launch',
+            'p/../f.launch',
             'PACKAGE/FILE.launch',
         ),
         (
