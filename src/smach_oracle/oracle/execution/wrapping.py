@@ -179,7 +179,7 @@ def sync_oracle(node: TreeNode) -> None:
     meta = states.get(label)
     outcomes = machine.get_registered_outcomes()
     if isinstance(meta, OracleState) and meta.leads_on(
-        tuple(states), outcomes, transitions.get(label)
+        tuple(states), outcomes, transitions.get(label, {})
     ):
         return
     if (meta is not None and not isinstance(meta, OracleState)) or label in outcomes:

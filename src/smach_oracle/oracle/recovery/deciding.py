@@ -1,8 +1,9 @@
 """Decides about a failure of a state, for the oracle of one level (paper, Algorithm 1)."""
 
-from typing import Optional, Sequence, Tuple
+from typing import Optional, Sequence, Tuple, cast
 
 from ..decision.by_ways import action_of
+from ..decision.failure_rate import FailureClass
 from ..decision.policy import Action, Menu, Past, Preconditions, Situation
 from ..decision.sentence import goes
 from ..decision.ways import Evidence, StreakSoFar, WayKind
@@ -66,7 +67,7 @@ def _follow_policy(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     drawn = '{}/{} {}'.format(node.path, record.label, record.visits) if policy.draws else ''
     situation = Situation(
         reading.failure_class,
-        _run_preconditions(recovery),
+        _run_preconditions(recovery, reading.failure_class),
         recovery.occasion.continuous,
         Past(record.recoveries, node.tree.restarts.count, drawn, node.tree.trials - 1),
     )
@@ -97,12 +98,14 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
     record, policy, budget = recovery.record, recovery.node.in_force.policy, recovery.budget
     streak = _streak(recovery)
     chosen = _first_way(recovery, situation, ways_on(recovery, why_not_above), streak)
-    spent = '' if chosen is None else _take_recovery(recovery, policy.most_of_trial)
-    if chosen is None or spent:  # by others meanwhile
+    if chosen is None:
+        why = policy.why(cast(Situation, recovery.situation))
+        return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
+    spent = _take_recovery(recovery, policy.most_of_trial)
+    if spent:  # by others meanwhile
         recovery.choice = None
-        decider = Decider.BUDGET if spent and budget.why_no_recovery() else Decider.POLICY
-        why = spent or policy.why(recovery.situation or situation)
-        return decider, recovery.facts(Action.ASK, blocked=why)
+        decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
+        return decider, recovery.facts(Action.ASK, blocked=spent)
     recovery.jump_path = chosen.option.jump_path
     streak.leaves = bool(chosen.option.jump_path.left_containers)
     facts = recovery.facts(
@@ -134,13 +137,14 @@ def _first_way(
     """
     while True:
         recovery.situation = _with_menu(recovery, situation, ways, streak)
-        choice = recovery.choice = recovery.node.in_force.policy.choose(recovery.situation)
+        choice = recovery.node.in_force.policy.choose(recovery.situation)
         if choice.remark:
             recovery.node.warn_once('ways', choice.remark, recovery.record.label)
         if not choice.ways:
             return None
         chosen = next(each for each in ways if each.way == choice.ways[0])
         if chosen.way.kind is not WayKind.PREPARE or _are_brought_about(recovery):
+            recovery.choice = choice
             return chosen
         if recovery.stopped():
             return None
@@ -204,13 +208,12 @@ def _take_recovery(recovery: Recovery, most: Optional[int] = None) -> str:
 # -- preconditions
 
 
-def _run_preconditions(recovery: Recovery) -> Preconditions:
+def _run_preconditions(recovery: Recovery, failure_class: FailureClass) -> Preconditions:
     record, policy = recovery.record, recovery.node.in_force.policy
     specs = record.settings.preconditions
     if not specs:
         return Preconditions.NONE
-    reading = recovery.reading
-    if reading is not None and not policy.runs_preconditions(reading.failure_class):
+    if not policy.runs_preconditions(failure_class):
         return Preconditions.NOT_MET
     return Preconditions.MET if _are_brought_about(recovery) else Preconditions.NOT_MET
 

@@ -135,9 +135,9 @@ def _judge(
         text = 'State {!r} of type {} returned {}; its registered outcomes are {}'.format(
             label, repr_of(state), repr_of(outcome), names(state.get_registered_outcomes())
         )
-        told = outcome if isinstance(outcome, str) else None
-        failure = Failure(label, FailureKind.UNREGISTERED_OUTCOME, told or '', text)
-        if told is not None and not node.site.is_container:
+        told = outcome if isinstance(outcome, str) else ''
+        failure = Failure(label, FailureKind.UNREGISTERED_OUTCOME, told, text)
+        if isinstance(outcome, str) and not node.site.is_container:
             return failure._replace(route=Route(told, False))
         return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
     outcome = cast(str, outcome)
@@ -324,6 +324,4 @@ def _latest_kept(node: TreeNode, told_by: str, visits: Tuple[Visit, ...]) -> Opt
 def _is_kept(node: TreeNode, visit: Visit, route: Route) -> bool:
     settings = node.settings_of(visit.state)
     kind = failure_kind(visit.outcome, route, settings, node.in_force.failing)
-    return kind is FailureKind.FAILING_OUTCOME and node.site.foresees(
-        visit.outcome, route, kind, settings
-    )
+    return node.site.foresees(visit.outcome, route, kind, settings)

@@ -141,7 +141,8 @@ class Inquiry:
             return
         self._cancelled.set()
         patience = Scope(clock=self._scope.clock)  # in which nothing ends it
-        if not patience.wait(_PATIENCE_S, port.done) and port.leave_behind():
+        patience.wait(_PATIENCE_S, port.done)
+        if port.leave_behind():
             self._recovery.warn(
                 "the expert's port goes on although its question was taken back; it is left behind"
             )
@@ -160,19 +161,20 @@ class Inquiry:
         offer = next(offer for offer in question.interfaces if offer.name == answer.interface)
         run, cancelled, by = self._expert.run_interface, self._cancelled, answer.by
         self._tell(EventKind.INTERFACE_START, target=offer.name, by=by)
-        outcome, done = '', None
+        outcome = ''
         try:
             given = self._guarded(lambda told: run(offer, question, cancelled, told))
-            if given is not None:
-                done = checked_type(given)
-                if done.kind is not AnswerKind.SUPERSEDE:
-                    raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
-                self._check(done, question)
-                outcome = done.outcome
+            if given is None:
+                self._recovery.tried.append('interface {}: failed'.format(offer.name))
+                return None
+            done = checked_type(given)
+            if done.kind is not AnswerKind.SUPERSEDE:
+                raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
+            self._check(done, question)
+            outcome = done.outcome
         finally:
             self._tell(EventKind.INTERFACE_END, target=offer.name, by=by, outcome=outcome)
-        self._recovery.tried.append('interface {}: {}'.format(offer.name, outcome or 'failed'))
-        return done if done is None or done.by else done._replace(by=by)
+        return done if done.by else done._replace(by=by)
 
     def _tell(self, kind: EventKind, **fields: str) -> None:
         self._recovery.tell(kind, query_id=self._recovery.question_id, **fields)

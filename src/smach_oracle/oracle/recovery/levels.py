@@ -54,7 +54,7 @@ def _is_item_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
 
 
 def foreseen_above(
-    node: TreeNode, ending: ContainerEnding, way: Optional[JumpPath] = None
+    node: TreeNode, ending: ContainerEnding, way: Optional[JumpPath]
 ) -> Optional[Foreseen]:
     """Return what the author has drawn after the end of a container, None where that is nothing.
 

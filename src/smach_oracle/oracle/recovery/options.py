@@ -19,8 +19,6 @@ from typing import (
     Tuple,
 )
 
-import smach
-
 from ..decision.sentence import going_would_repeat
 from ..decision.ways import WAITS_S, Way, WayKind
 from ..machine.nesting import records_of
@@ -312,8 +310,11 @@ def menu_of(
 
 def _goals(
     node: TreeNode, label: str, visited: Sequence[str]
-) -> Iterator[Tuple[WayKind, str, TreePlace]]:
-    """Yield where a step back may lead, each place once: 1, 2, 4... states back, to the starts."""
+) -> Iterator[Tuple[WayKind, str, Optional[TreePlace]]]:
+    """Yield where a step back may lead, each place once: 1, 2, 4... states back, to the starts.
+
+    The place is None where it is gone.
+    """
     goals = [
         (WayKind.STEP_BACK, name)
         for back, name in enumerate(visited, 1)
@@ -325,10 +326,9 @@ def _goals(
             goals.append((kind, start))
     met = {label}
     for kind, name in goals:
-        place = place_named(node, name)
-        if name not in met and place is not None:
+        if name not in met:
             met.add(name)
-            yield kind, name, place
+            yield kind, name, place_named(node, name)
 
 
 def _entered_at(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
@@ -339,7 +339,7 @@ def _entered_at(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
 
 def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
     state = states_of(place.node.machine)[place.label]
-    below = node_of(state) if isinstance(state, smach.StateMachine) else None
+    below = node_of(state)
     inner = (
         {}
         if below is None

@@ -309,8 +309,8 @@ PHASES: Tuple[Callable[[Recovery], Optional[Verdict]], ...] = (
     fall_back,
 )
 
-_Led = Tuple[Labels, Labels, Optional[Transitions], int]
-_NOTHING: _Led = ((), (), None, 0)
+_Led = Tuple[Labels, Labels, Transitions, int]
+_NOTHING: _Led = ((), (), {}, 0)
 
 
 class OracleState(smach.State):
@@ -335,10 +335,10 @@ class OracleState(smach.State):
         """Note the states and outcomes of the container to all of which these transitions lead."""
         self._led = states, outcomes, drawn, len(drawn)
 
-    def leads_on(self, states: Labels, outcomes: Labels, drawn: Optional[Transitions]) -> bool:
+    def leads_on(self, states: Labels, outcomes: Labels, drawn: Transitions) -> bool:
         """Whether nothing of that has changed since."""
         led_states, led_outcomes, led_drawn, count = self._led
-        if drawn is None or drawn is not led_drawn or len(drawn) != count:
+        if drawn is not led_drawn or len(drawn) != count:
             return False
         return led_outcomes == outcomes and led_states == states
 

@@ -165,7 +165,7 @@ class Recovery:
     def chosen(self) -> Optional[ChosenWay]:
         """Return the way that it has decided for, None where no streak is to know of it."""
         choice, situation = self.choice, self.situation
-        if choice is None or situation is None or not choice.ways:
+        if choice is None or situation is None:
             return None
         way, place = choice.ways[0], LATER if situation.menu.streak.tried else FIRST
         return self._gone(way.key, way.kind, place, choice.hoped)

@@ -233,7 +233,7 @@ def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     return natural_ending(node, failure)
 
 
-def failing_outcome(node: TreeNode, first: Sequence[Optional[str]] = ()) -> Optional[str]:
+def failing_outcome(node: TreeNode, first: Sequence[Optional[str]]) -> Optional[str]:
     """Return the failing outcome with which a container ends that nobody leads elsewhere.
 
     None means it has none. `first`: names that come before the order of the alphabet.
