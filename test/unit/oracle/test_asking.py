@@ -182,6 +182,13 @@ def test_after_the_first_answer_that_does_not_fit_it_asks_again_at_once(clock):
     assert second.deadline_s == first.deadline_s
 
 
+@pytest.mark.parametrize('deadline_s, told', [(0, ''), (30, ', 30 s'), (0.5, ', 0.5 s')])
+def test_a_decision_to_ask_says_how_long_the_expert_has(deadline_s, told):
+    machine, _ = asking(goto('B'), deadline_s=deadline_s)
+    assert machine.run() == 'done'
+    assert machine.of(EventKind.DECISION)[0].text.endswith(': asking an expert' + told)
+
+
 def test_nonsense_without_end_ends_at_the_deadline_and_does_not_spin():
     machine, expert = asking(*[goto('NOWHERE')] * 10000, deadline_s=0.3)
     assert machine.run() == 'aborted'
@@ -199,6 +206,22 @@ def test_nonsense_does_not_spin_where_there_is_no_deadline():
     machine, _ = asking(*[answer] * 4, deadline_s=0)
     assert machine.run() == 'done'
     assert times_s[3] - times_s[1] > 0.5, 'it waits longer after each'
+
+
+@pytest.mark.parametrize('deadline_s, ends', [(0, 'done'), (2.0, 'aborted')])
+def test_the_pauses_after_nonsense_double_up_to_a_second_or_the_deadline(deadline_s, ends, clock):
+    asked_s = [clock.now()]
+
+    def answer(question, cancelled, progress):
+        asked_s.append(clock.now())
+        return goto('NOWHERE' if len(asked_s) < 9 else 'B')
+
+    machine, _ = asking(*[answer] * 8, deadline_s=deadline_s)
+    assert machine.run() == ends
+    asked_s.append(clock.now())
+    pauses_s = [later - before for before, later in zip(asked_s, asked_s[1:])]
+    long_s = [1.0, 1.0, 1.0, 0.0] if ends == 'done' else [0.6]
+    assert pauses_s == pytest.approx([0.0, 0.0, 0.2, 0.4, 0.8, *long_s])
 
 
 def test_without_an_expert_the_machine_stops_at_once_with_the_original_outcome():
@@ -226,6 +249,21 @@ def test_a_question_nobody_answers_falls_back(fallback, outcome, visits):
     assert bool(machine.of(EventKind.WARNING)) is (
         fallback in ('goto:NOWHERE', {'give_up': 'nonsense'})
     )
+
+
+def test_a_fallback_does_not_lead_to_what_cannot_be_entered():
+    machine, _ = asking(on_no_answer='goto:A', states={'A': {'on_retry': 'never'}})
+    assert machine.run() == 'aborted'
+    (warning,) = machine.of(EventKind.WARNING)
+    assert 'was done in this trial and must not be repeated (on_retry: never)' in warning.text
+
+
+def test_a_fallback_that_goes_to_an_outcome_goes_nowhere():
+    machine, expert = asking(on_no_answer='goto:preempted')
+    assert machine.run() == 'aborted'
+    assert expert.questions[0].fallback == 'stop with aborted'
+    (warning,) = machine.of(EventKind.WARNING)
+    assert "cannot go to 'preempted': no such state; there are" in warning.text
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Containers that lie in each other: as many as the stack holds, and one clear error beyond."""
 
+import inspect
 import os
 import re
 import sys
@@ -118,3 +119,27 @@ def test_a_state_whose_functions_call_each_other_without_end_has_failed_as_by_an
     assert executed(machine) == 'done'
     (failed,) = [event for event in seen if event.kind is EventKind.FAILURE]
     assert 'RecursionError' in failed.text
+
+
+def test_another_error_where_little_of_the_stack_is_left_is_a_failure():
+    def slips(state, userdata):
+        sys.setrecursionlimit(len(inspect.stack(0)) + 140)
+        raise ValueError('slipped')
+
+    def goes_on(state, userdata):
+        sys.setrecursionlimit(1000)
+        return 'ok'
+
+    machine = chain_of(Scripted(slips, goes_on))
+    seen = watched(machine)
+    assert executed(machine) == 'done'
+    (failed,) = [event for event in seen if event.kind is EventKind.FAILURE]
+    assert 'slipped' in failed.text
+
+
+def test_errors_that_name_each_other_as_their_cause_are_looked_at_once():
+    first, second = ValueError('first'), ValueError('second')
+    first.__cause__, second.__cause__ = second, first
+    machine = machine_around(machine_around(Scripted(first, outcomes=OUTCOMES)))
+    watched(machine)
+    assert executed(machine) == 'ok'

@@ -126,3 +126,27 @@ def test_a_container_that_is_left_goes_no_way_that_it_went_before_with_the_same_
         *('A', 'PICK', 'CHECK', 'PICK'),
         *('A', 'PICK', 'CHECK'),
     ]
+
+
+@pytest.mark.parametrize(
+    'outcomes, fails, left_with',
+    [
+        (['done', 'aborted', 'preempted'], 'aborted', 'preempted'),
+        (['done', 'aborted', 'failed'], 'failed', 'failed'),
+        (['a_good_one', 'done', 'failed'], ValueError('slipped'), 'failed'),
+        (['a_good_one', 'done'], ValueError('slipped'), 'a_good_one'),
+    ],
+)
+def test_a_container_that_is_left_ends_with_the_outcome_that_says_least(outcomes, fails, left_with):
+    arm, top, told = smach.StateMachine(outcomes), smach.StateMachine(outcomes), []
+    failing = [each for each in outcomes if each not in ('a_good_one', 'done')]
+    with arm:
+        smach.StateMachine.add('GRASP', Scripted(fails, outcomes=['ok', *failing]), {'ok': 'done'})
+    arm.register_termination_cb(lambda ud, active, outcome: told.append(outcome))
+    with top:
+        smach.StateMachine.add('LOOK', Scripted(outcomes=['ok']), {'ok': 'ARM'})
+        smach.StateMachine.add('ARM', arm)
+    answers = goto('LOOK', container='TOP')
+    machine = Watched(top, name='TOP', expert=FakeExpert(answers), settings={'max_recoveries': 0})
+    assert machine.run() == 'done'
+    assert told == [left_with, 'done']

@@ -1,6 +1,11 @@
 """What a question says is to be expected of each choice, and which one it recommends."""
 
-from machines import FakeExpert, Scripted, goto, supersede, watched
+import threading
+
+from machines import FakeExpert, FakeWaiting, Scripted, goto, supersede, watched
+from waiting import wait_for
+
+from smach_oracle.oracle import oracle_of
 
 FAILS = ['aborted'] * 30
 
@@ -80,3 +85,44 @@ def test_what_repeats_a_state_that_is_not_to_be_repeated_is_not_recommended():
         assert machine.run() == 'done'
     told = choices(expert.questions[-1])
     assert told['B'].helped == 2 and told['B'].repeats and not told['B'].recommended
+
+
+def test_what_was_in_vain_a_moment_ago_is_not_recommended():
+    """Going back to A has helped twice, and has not helped this time."""
+    fails = ['aborted', 'aborted', 'aborted', 'ok'] * 2 + FAILS
+    machine, expert = asking(supersede('ok'), fails=fails, count=2, max_recoveries=50)
+    oracle_of(machine.machine).waiting = FakeWaiting()
+    for _ in range(3):
+        assert machine.run() == 'done'
+    told = choices(expert.questions[-1])['A']
+    assert (told.way, told.helped, told.tried, told.recommended) == ('from A', 2, 3, '')
+
+
+def test_what_cannot_be_entered_now_is_not_recommended(clock):
+    """B still runs, though its time is over."""
+    released = threading.Event()
+
+    def hangs(state, ud):
+        clock.advance(31)
+        assert wait_for(state.preempt_requested)
+        clock.advance(31)
+        assert released.wait(20)
+        return 'ok'
+
+    expert = FakeExpert(goto('B'), goto('B'), goto('C'), supersede('ok'))
+    machine = watched(
+        Scripted(),
+        Scripted(*['ok'] * 4, hangs),
+        Scripted(*['aborted', 'ok'] * 2, 'aborted'),
+        settings={
+            'policy': 'escalating',
+            'max_recoveries': 0,
+            'states': {'B': {'time_limit_s': 30.0, 'grace_period_s': 30.0}},
+        },
+        expert=expert,
+    )
+    for _ in range(3):
+        assert machine.run() == 'done'
+    released.set()
+    told = choices(expert.questions[-1])['B']
+    assert told.blocked and (told.helped, told.tried, told.recommended) == (2, 2, '')

@@ -124,6 +124,7 @@ class Deaf:
 
     def __call__(self, question, cancelled, progress):
         self.cancelled = cancelled
+        self.thread = threading.current_thread()
         self.asked.set()
         assert self.let_go.wait(20)
         progress('claimed', 'eva', 'late')
@@ -151,6 +152,20 @@ def test_a_port_that_ignores_its_cancellation_does_not_outlast_the_deadline(impa
     count = len(machine.events)
     deaf.leave()
     assert len(machine.events) == count, 'what it tells too late is dropped'
+
+
+def test_an_answer_of_a_port_that_was_left_behind_a_moment_ago_is_no_answer(impatient):
+    deaf = Deaf()
+    machine, _ = asking(deaf, deadline_s=0.1)
+
+    def answers(event):
+        if 'left behind' in event.text:
+            deaf.leave()
+            deaf.thread.join(20)
+
+    machine.machine.events.observers.append(answers)
+    assert in_thread(machine.run).result() == 'aborted'
+    assert machine.visits() == ['A', 'B'] and not machine.of(EventKind.QUERY_ANSWERED)
 
 
 def test_a_port_that_ignores_its_cancellation_does_not_outlast_a_preempt(impatient):

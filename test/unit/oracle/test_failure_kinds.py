@@ -1,7 +1,8 @@
 """What counts as a failure, and what ends as it did without an oracle."""
 
 import pytest
-from machines import FakeExpert, Scripted, Watched, chain_of, supersede, watched
+from guarded_machines import OUTCOMES, both, chain
+from machines import FakeExpert, Gate, Scripted, Watched, chain_of, supersede, watched
 
 import smach
 from smach_oracle.oracle import oracle_of
@@ -43,6 +44,30 @@ def test_where_nothing_more_can_be_said_of_a_failure_the_log_says_why(log):
     oracle_of(machine.machine).describe_failure = describe
     assert machine.run() == 'done' and machine.of(EventKind.FAILURE)[0].text == ''
     assert ('warn', "SM_ROOT/A: cannot say more of its failure: OSError('no link')") in log
+
+
+@pytest.mark.parametrize(
+    'end, said',
+    [
+        ('aborted', 'aborted'),
+        (None, "State 'A' of type"),
+        ('', "State 'A' of type"),
+        (Gate(), 'overran its time limit of 0.05 s'),
+    ],
+)
+def test_the_log_says_in_one_line_what_went_wrong(end, said, log):
+    machine = watched(Scripted(end), settings={'time_limit_s': 0.05 if callable(end) else None})
+    machine.run()
+    line = next(text for level, text in log if level == 'warn')
+    assert line.startswith('SM_ROOT/A failed: ' + said)
+
+
+def test_the_log_says_so_of_a_branch_without_an_outcome_too(log):
+    machine = Watched(chain(BOTH=both(LEFT=Scripted('', 'done', outcomes=OUTCOMES))))
+    assert machine.run() == 'done'
+    assert [text[:37] for level, text in log if level == 'warn'] == [
+        "SM_ROOT/BOTH/LEFT failed: State 'LEFT"
+    ]
 
 
 @pytest.mark.parametrize('nonsense', [None, 'no such outcome', 7, ['ok'], {}])

@@ -150,3 +150,27 @@ def test_a_breakpoint_before_an_item_pauses_the_machine() -> None:
         held.hand.remove_breakpoint('ITEM')
         held.hand.resume()
         assert held.end() == 'done'
+
+
+@pytest.mark.parametrize('autonomy', ['run', 'confirm'])
+def test_a_state_that_is_given_as_a_precondition_is_held_by_a_pause_alone(autonomy) -> None:
+    gate, clear = Gate('aborted'), Scripted()
+    held = Held(
+        chain_of(Scripted(gate)),
+        settings={'states': {'A': {'autonomy': autonomy}}},
+        preconditions={'A': [clear]},
+    )
+    with held.begin():
+        if autonomy == 'confirm':
+            held.waits_before('SM_ROOT/A')
+            held.hand.confirm()
+        assert gate.entered.wait(20)
+        if autonomy == 'run':
+            held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/A' if autonomy == 'confirm' else 'SM_ROOT/Scripted')
+        assert clear.runs == (autonomy == 'confirm')
+        held.hand.confirm() if autonomy == 'confirm' else held.hand.resume()
+        assert held.end() == 'done'
+    by = [event.by for event in held.of(EventKind.HOLD_START)]
+    assert by == (['', ''] if autonomy == 'confirm' else [held.of(EventKind.HOLD_START)[0].by])

@@ -5,10 +5,10 @@ import threading
 import time
 
 import pytest
-from machines import Gate, Scripted, Watched, chain_of, in_thread
+from machines import FakeWaiting, Gate, Scripted, Watched, chain_of, in_thread
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 
@@ -54,6 +54,14 @@ def test_a_state_that_does_not_end_well_leaves_the_precondition_unmet(end):
     machine.run()
     assert ends(machine) == [('Scripted', 'not met')]
     assert machine.decisions() == [('step_back', 'A')]
+
+
+def test_an_outcome_that_is_listed_as_a_failure_leaves_the_precondition_unmet():
+    machine = machine_with(
+        Scripted('cloudy', outcomes=('ok', 'cloudy')), failure_outcomes=['cloudy']
+    )
+    machine.run()
+    assert ends(machine) == [('Scripted', 'not met')]
 
 
 def test_the_label_of_another_state_is_a_precondition_and_its_run_is_no_visit():
@@ -250,6 +258,21 @@ def test_the_machine_does_not_go_on_by_itself_while_a_function_still_runs():
     (decision,) = machine.of(EventKind.DECISION)
     assert decision.outcome == 'ask' and 'hanging still runs' in decision.text
     hanging.leave()
+
+
+def test_while_a_function_still_runs_no_way_begins_with_it():
+    hanging = Hanging()
+    machine = machine_with(hanging, b=Scripted(*['aborted'] * 9), policy='escalating', **BRIEF)
+    oracle_of(machine.machine).waiting = FakeWaiting()
+    assert in_thread(machine.run).result() == 'aborted'
+    hanging.leave()
+    blocked = [
+        [way['blocked'] for way in event.data['menu'] if way['kind'] == 'prepare']
+        for event in machine.of(EventKind.DECISION)
+    ]
+    assert {way['blocked'] for way in machine.of(EventKind.DECISION)[0].data['menu']} == {''}
+    still = ['hanging still runs since it overran its time limit']
+    assert blocked == [[''], ['hanging did not help'], still, still, still]
 
 
 def test_a_function_that_ends_within_its_grace_period_lets_the_machine_go_on():

@@ -275,6 +275,21 @@ def test_none_is_run_in_a_machine_of_two_containers_that_the_other_one_holds():
     )
 
 
+@pytest.mark.parametrize('guarded, sees_before', [('SEE', False), ('POUR', True)])
+def test_what_is_new_or_may_be_repeated_is_run(guarded, sees_before):
+    see = {'SEE': chain(LOOK=Scripted())}
+    pick = {'POUR': Scripted(), 'PICK': chain(GRASP=Scripted('aborted'))}
+    watched = wrapped(
+        chain(**({**see, **pick} if sees_before else {**pick, **see})),
+        'GRASP',
+        'SEE/LOOK',
+        states={guarded: {'on_retry': 'confirm'}},
+        expert=FakeExpert(give_up()),
+    )
+    watched.run()
+    assert [each[3] for each in ends(watched)] == ['met']
+
+
 def test_a_state_that_is_not_repeated_by_itself_is_not_met():
     pour = Scripted()
     watched = wrapped(
@@ -365,6 +380,31 @@ def test_what_an_unmet_one_of_a_container_around_wrote_is_taken_back():
     machine = wrapped(top, 'GRASP', '/LOOK')
     assert machine.run() == 'done' and look.runs == 2
     assert contents(machine.machine.userdata) == {'x': 1}
+
+
+def test_what_one_of_a_container_around_wrote_survives_a_step_back():
+    """LOOK writes what is there already. FIRST was entered with something else."""
+    seen = []
+
+    def writes(state, ud):
+        ud.x = 2
+        return 'ok'
+
+    def first(state, ud):
+        seen.append(ud.x)
+        return writes(state, ud)
+
+    pick = smach.StateMachine(OUTCOMES, input_keys=['x'])
+    with pick:
+        smach.StateMachine.add('FIRST', Scripted(first, first, io_keys=['x']), {'ok': 'GRASP'})
+        smach.StateMachine.add('GRASP', Scripted('aborted', 'aborted'), {'ok': 'done'})
+    top = chain(LOOK=Scripted('ok', writes, writes, output_keys=['x']), PICK=pick)
+    top.userdata.x = 1
+    settings = {'memory': 1000, 'states': {'GRASP': {'preconditions': ['/LOOK']}}}
+    machine = Watched(top, settings=settings)
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('revisit', 'GRASP'), ('step_back', 'FIRST')]
+    assert seen == [1, 2]
 
 
 def test_a_machine_that_a_precondition_executes_by_hand_asks_nobody():

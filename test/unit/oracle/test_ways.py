@@ -379,6 +379,47 @@ def test_a_state_that_may_end_the_loop_is_on_no_menu_of_a_later_round():
     }
 
 
+def taken_away(machine, label):
+    for table in (machine.machine._states, machine.machine._transitions):
+        del table[label]
+
+
+def test_what_leads_to_a_state_that_is_gone_does_not_end_the_loop():
+    """NEXT, PICK, and again from NEXT, which leads to ASIDE, too, until PICK fails."""
+
+    def fail(state, ud):
+        taken_away(machine, 'ASIDE')
+        return 'aborted'
+
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add(
+            'NEXT', Scripted(outcomes=('ok', 'aside', 'aborted')), {'ok': 'PICK', 'aside': 'ASIDE'}
+        )
+        smach.StateMachine.add('PICK', Scripted('ok', fail, 'ok', 'ok'), {'ok': 'MORE'})
+        more = Scripted('more', outcomes=('ok', 'more', 'aborted'))
+        smach.StateMachine.add('MORE', more, {'more': 'NEXT', 'ok': 'done'})
+        smach.StateMachine.add('ASIDE', Scripted(), {'ok': 'MORE'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    assert {way['target'] for way in machine.of(EventKind.DECISION)[0].data['menu']} == {
+        'PICK',
+        'NEXT',
+    }
+
+
+def test_a_state_that_is_gone_is_on_no_menu_and_not_entered_on_the_way():
+    def fail(state, ud):
+        taken_away(machine, 'B')
+        return 'aborted'
+
+    machine = failing(3, fails=['aborted', fail], expert=FakeExpert())
+    assert machine.run() == 'done'
+    assert [key for key in menu_at(machine, 0) if isinstance(key, str)] == ['B', 'A']
+    assert [key for key in menu_at(machine, 1) if isinstance(key, str)] == ['A']
+    assert list(menu_at(machine, 1)['A']['repeats']) == ['A']
+
+
 def test_a_list_that_was_appended_to_in_place_is_restored_only_if_it_is_copied():
     def put(ud):
         ud.placed.append('cup')

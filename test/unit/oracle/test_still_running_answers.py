@@ -1,0 +1,69 @@
+"""What an answer about a state that still runs comes to, and what a question may look at."""
+
+import threading
+
+import pytest
+from machines import FakeExpert, Gate, Scripted, chain_of, goto, supersede
+from test_still_running import asked, failures, letting_go
+
+from smach_oracle.oracle.records.events import EventKind
+
+
+@pytest.mark.parametrize('by, who', [('eva', 'eva'), ('', 'the expert')])
+def test_the_log_says_who_waits_on(by, who, log):
+    gate = Gate()
+    expert = FakeExpert(goto('A')._replace(by=by), letting_go(gate, None))
+    assert asked(Scripted('aborted', gate), expert=expert).run() == 'done'
+    assert ('info', 'SM_ROOT/A: {} waits on'.format(who)) in log
+
+
+def test_an_answer_of_another_kind_that_names_the_state_is_not_to_wait_on():
+    expert = FakeExpert(supersede('ok', state='A'))
+    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=expert)
+    assert machine.run() == 'done' and machine.visits() == ['A', 'A', 'B']
+
+
+def test_a_state_of_the_same_name_in_another_container_is_gone_to():
+    inner = chain_of(Scripted())
+    machine = asked(
+        Scripted('aborted', Gate()), inner, expert=FakeExpert(goto('A', container='SM_ROOT/B'))
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['A', 'A', 'B', 'A'] and not failures(machine)[1:]
+
+
+def test_where_the_policy_asks_nobody_the_log_warns():
+    gate, expert = Gate(), FakeExpert()
+    machine = asked(Scripted('aborted', gate), expert=expert, policy='retry')
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.WARNING and gate.go.set()
+    )
+    assert machine.run() == 'done' and not expert.questions
+
+
+def test_the_question_looks_at_nothing_that_the_state_may_write_meanwhile():
+    class Box:
+        looked_at_by = []
+
+        def __deepcopy__(self, memo):
+            return self
+
+        def __reduce__(self):
+            self.looked_at_by.append(threading.current_thread())
+            return str, ()
+
+    gate = Gate()
+    expert = FakeExpert(letting_go(gate, None))
+    machine = asked(Scripted('aborted', gate), expert=expert, deep_copy_keys=['box'])
+    machine.machine.userdata.box = Box()
+    assert machine.run() == 'done' and len(expert.questions) == 1
+    assert set(Box.looked_at_by) == {threading.current_thread()}
+
+
+def test_an_answer_before_a_preempt_is_not_said_to_be_of_no_use():
+    machine = asked(Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(goto('B')))
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.QUERY_ANSWERED and machine.machine.request_preempt()
+    )
+    assert machine.run() == 'preempted'
+    assert not machine.of(EventKind.WARNING)
