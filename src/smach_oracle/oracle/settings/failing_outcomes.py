@@ -1,12 +1,12 @@
 """Decides which outcomes sound like a failure. Pure, and without smach."""
 
 import re
-from typing import Callable, Dict, Iterable, List, Optional, Pattern
+from functools import lru_cache
+from typing import Callable, Iterable, List, Optional, Pattern
 
 PREEMPTED = 'preempted'
 # the rule of earlier versions, by which their trials are counted. These come first of several
 FORMER_FAILING_OUTCOMES = ('aborted', 'failed', 'failure', 'error')
-_MOST_KNOWN = 1000  # names. A state may make up outcomes without end
 
 # what public programs call a failure, see doc/executive.md
 _FAILURES = frozenset(
@@ -52,20 +52,16 @@ class FailingNames:
         """`words`: those that a user has given. None means that the names' own words count."""
         self.by_name = words is None
         self.first = FORMER_FAILING_OUTCOMES if words is None else tuple(words)
-        self._names_failure: Callable[[str], bool] = (
-            _sounds_failing if words is None else _ends_with(self.first)
-        )
-        self._known: Dict[str, bool] = {}  # of names that were asked about
+        self._names_failure: Callable[[str], bool] = _sounds_failing
+        if not self.by_name:
+            self._names_failure = _ends_with(self.first)
 
     def __contains__(self, outcome: object) -> bool:
-        if not isinstance(outcome, str):
-            return False
-        known = self._known.get(outcome)
-        if known is None:
-            known = not is_preempted(outcome) and self._names_failure(outcome)
-            if len(self._known) < _MOST_KNOWN:
-                self._known[outcome] = known
-        return known
+        return (
+            isinstance(outcome, str)
+            and not is_preempted(outcome)
+            and self._names_failure(outcome)
+        )
 
     def excuse(self, outcome: str) -> bool:
         """Whether an outcome is no failure of its state although it ends the container in one."""
@@ -78,6 +74,7 @@ def sounds_like_success(outcome: str) -> bool:
     return bool(words) and words[-1] in _SUCCESSES and not NEGATIONS.intersection(words)
 
 
+@lru_cache()
 def _sounds_failing(outcome: str) -> bool:
     words = words_of(outcome)
     if not words:
