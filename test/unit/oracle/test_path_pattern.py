@@ -25,6 +25,11 @@ from smach_oracle.oracle.settings.names import PathPattern
         ('**/DRIVE', 'TOP', 'DRIVE', True),
         ('**', 'TOP', 'ANY', True),
         ('*/A?', 'TOP', 'A1', True),
+        ('TOP/NAV/DRIVE/ON', 'TOP/NAV', 'DRIVE', False),
+        ('**/DRIVE/ON', 'TOP', 'DRIVE', False),
+        ('**/DRIVE', 'TOP/NAV', 'TURN', False),
+        ('TOP/**/NAV/DRIVE', 'TOP/ONE/TWO/NAV', 'DRIVE', True),
+        ('TOP/**/NAV/DRIVE', 'TOP/ONE/NAV', 'DRIVE', True),
     ],
 )
 def test_which_states_are_meant(pattern: str, path: str, label: str, meant: bool) -> None:

@@ -165,7 +165,7 @@ def _matches(parts: Sequence[str], names: Tuple[str, ...]) -> bool:
     if not parts:
         return not names
     if parts[0] == '**':
-        return any(_matches(parts[1:], names[skipped:]) for skipped in range(len(names) + 1))
+        return _matches(parts[1:], names) or (bool(names) and _matches(parts, names[1:]))
     return (
         bool(names) and fnmatch.fnmatchcase(names[0], parts[0]) and _matches(parts[1:], names[1:])
     )
