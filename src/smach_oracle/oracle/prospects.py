@@ -1,6 +1,6 @@
 """Lists what an oracle may do in each state of a wrapped machine, before anything runs."""
 
-from typing import Any, Dict, FrozenSet, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
+from typing import Dict, FrozenSet, Iterator, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 import smach
 
@@ -151,7 +151,7 @@ def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     found: List[ContainerProspect] = []
     for node in nodes:
         prospect = _container(node, decides, unguarded)
-        if prospect.has_branches and found and found[-1].machine is prospect.machine:
+        if found and found[-1].machine is prospect.machine:  # branches of one container
             prospect = _joined(found.pop(), prospect)
         found.append(prospect)
     return found
@@ -180,14 +180,12 @@ def good_outcome(container: smach.Container, settings: Settings) -> Optional[str
 
 
 def _container(node: TreeNode, decides: bool, unguarded: Unguarded) -> ContainerProspect:
-    machine: Any = node.machine
-    initial = initial_label_of(machine) or next(iter(node.labels()), '')
     shown = node.site.shown()
     states = tuple(_state(node, label, decides, unguarded) for label in node.labels())
     return ContainerProspect(
         node.path,
         shown,
-        initial,
+        initial_label_of(node.machine),
         tuple(sorted(shown.get_registered_outcomes(), key=str)),
         node.settings,
         node.parent is None,

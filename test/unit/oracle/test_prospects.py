@@ -47,6 +47,12 @@ def outcome(state, name):
     return next(each for each in state.outcomes if each.outcome == name)
 
 
+def test_a_container_begins_where_it_was_set_to_begin():
+    wrapped = OracleContainer.wrap(machine())
+    wrapped.set_initial_state(['PICK'])
+    assert [each.initial for each in prospects_of(wrapped)] == ['PICK', 'PUT']
+
+
 def test_outcomes_lead_where_the_author_drew_them():
     states = told({})
     assert set(states) == {'HOME', 'PICK', 'HELP', 'PLACE', 'PUT'}
