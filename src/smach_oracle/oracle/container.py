@@ -176,13 +176,13 @@ class OracleContainer(smach.StateMachine):
         }
         given = {key: value for key, value in own.items() if value is not None}
         machine: Any = opened_container()
-        if given and not isinstance(machine, OracleContainer):
-            raise SettingsError(
-                'add',
-                sorted(given),
-                'these settings in an OracleContainer, not {!r}'.format(machine),
-            )
         if given:
+            if not isinstance(machine, OracleContainer):
+                raise SettingsError(
+                    'add',
+                    sorted(given),
+                    'these settings in an OracleContainer, not {!r}'.format(machine),
+                )
             marked_node(machine).settings.with_states({label: given})
         more = {} if constants is None else {'constants': constants}
         smach.StateMachine.add(label, state, transitions, remapping, **more)
@@ -271,8 +271,10 @@ class OracleContainer(smach.StateMachine):
         for label in labels:
             if self._oracle.is_oracle(label):
                 raise entered_by_failures_alone(label)
-        more = () if userdata is None else (userdata,)
-        super().set_initial_state(initial_states, *more)
+        if userdata is None:
+            super().set_initial_state(initial_states)
+        else:
+            super().set_initial_state(initial_states, userdata)
 
     def check_consistency(self) -> None:
         """Raise what a StateMachine raises for an inconsistent machine.

@@ -293,11 +293,10 @@ class Control:
 
     def stop_is_over(self) -> None:
         """Hold again what is to be held: the machine goes on after a stop that was serviced."""
-        if self._stop is not None:
-            with self._changed:
-                if self._stop is not None and self._stop.ends_s != math.inf:
-                    self._stop = None
-                    self._note_change()
+        with self._changed:
+            if self._stop is not None and self._stop.ends_s != math.inf:
+                self._stop = None
+                self._note_change()
 
     @property
     def holds_all(self) -> bool:
