@@ -96,6 +96,14 @@ def test_a_gain_that_is_likely_and_not_certain_moves_nothing():
     assert choice.hoped is None and keys(choice.ways) == keys(Escalating().order(given))
 
 
+def test_a_gain_that_is_nearly_certain_and_a_loss_on_the_average_moves_nothing():
+    quick, back = AGAIN._replace(minutes=0.001), BACK._replace(minutes=12.0, repeats=())
+    given = situation([result(back, LATER, True)] * 5, (quick, back))
+    rare = given.menu.evidence._replace(of_kinds={(quick.kind.value, FIRST): (0.0, 1000.0)})
+    choice = Learned().choose(given._replace(menu=given.menu._replace(evidence=rare)))
+    assert choice.hoped is None and keys(choice.ways) == [quick.key, back.key]
+
+
 def test_a_way_beyond_the_attempts_of_the_trial_is_not_moved():
     # seven attempts are spent: the menu's own order has one left, which is to enter it again
     spent = situation(vain_then_back(6))._replace(past=Past(attempts=7))
@@ -216,6 +224,8 @@ def test_the_first_place_follows_from_the_later_one():
     later, first = (estimates.chance(BACK, place).mean for place in (LATER, FIRST))
     assert first < later
     assert estimates.chance(AGAIN, LATER).mean < estimates.chance(AGAIN, FIRST).mean
+    half = estimates.chance(AGAIN, FIRST).mean / 2
+    assert estimates.chance(AGAIN, LATER).mean == pytest.approx(half)
 
 
 class PlainEstimates(Estimates):

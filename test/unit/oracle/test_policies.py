@@ -15,7 +15,15 @@ from machines import FakeExpert, Scripted, Watched, chain_of, goto, supersede, w
 import smach
 from smach_oracle.oracle.decision.failure_rate import FailureClass
 from smach_oracle.oracle.decision.policies import POLICIES, policy_named
-from smach_oracle.oracle.decision.policy import FailureContext, Past, Preconditions, Situation
+from smach_oracle.oracle.decision.policy import (
+    FailureContext,
+    Menu,
+    Past,
+    Preconditions,
+    Situation,
+    draws_of,
+)
+from smach_oracle.oracle.decision.ways import Way, WayKind
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.history import History
@@ -448,3 +456,11 @@ def test_a_baseline_says_why_it_ends_once_it_does(name, spent, why):
     policy = policy_named(name)
     assert [policy.why(situation(before)) for before in range(spent)] == [''] * spent
     assert policy.why(situation(spent)) == why
+
+
+def test_a_draw_that_is_just_the_chance_swaps_no_ways():
+    drawn = draws_of(0, Past()).random()
+    ways = Way(WayKind.AGAIN, 'A', minutes=1.0), Way(WayKind.STEP_BACK, 'B', 1, minutes=2.0)
+    given = Situation(FailureClass.LOW, Preconditions.NONE, False, menu=Menu(ways))
+    choice = policy_named('escalating', {'explore': drawn}).choose(given)
+    assert choice.ways == ways and choice.chance == 1.0 - drawn

@@ -105,6 +105,12 @@ def test_classes_begin_at_their_thresholds(rate, failure_class):
     assert classify(rate, 0.4, 0.75) is failure_class
 
 
+def test_a_rate_that_only_rounding_keeps_from_a_threshold_has_reached_it():
+    above = 0.5 + 1e-9
+    assert classify(0.5, above, 0.75) is FailureClass.MODERATE
+    assert classify(0.5, 0.4, above) is FailureClass.HIGH
+
+
 @pytest.mark.parametrize('estimator', [FailureRate, ExponentialFailureRate])
 @pytest.mark.parametrize(
     'memory, prior', [(0, 0.1), (-1, 0.1), (1.5, 0.1), (True, 0.1), (3, -0.1), (3, 1.1), (3, None)]
