@@ -236,6 +236,22 @@ def test_in_a_child_process_a_machine_is_what_its_author_wrote(log):
     assert asked.questions == []
 
 
+def test_a_machine_whose_state_has_forked_keeps_its_class_in_the_child():
+    """It runs there, too: its outer execution is still to come to an end."""
+    inside = []
+
+    def fork_once(state, userdata):
+        if not inside:
+            inside.append(in_a_fork(lambda: (inside.append(None), run_again())[1]))
+        return 'ok'
+
+    def run_again():
+        return machine.execute(), isinstance(machine, OracleContainer)
+
+    machine = watched(Scripted(fork_once)).machine
+    assert machine.execute() == 'done' and inside == [('done', True)]
+
+
 def test_a_record_is_of_a_state_of_the_machine():
     machine = watched(Scripted()).machine
     node = marked_node(machine)

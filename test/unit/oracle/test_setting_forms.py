@@ -152,3 +152,4 @@ def test_each_older_key_is_the_field_of_its_setting():
     assert 'checkpoint' not in older, 'a group may be given by its short form'
     for name, key in older.items():
         assert GROUPS.key_of(name) == key and hasattr(Settings(), name)
+        assert name != key, 'it is no older one'

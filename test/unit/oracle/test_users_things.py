@@ -253,6 +253,13 @@ def test_the_items_of_an_iterator_look_as_its_author_gave_them():
     assert not hasattr(items, 'no_such_method') and not hasattr(items, '_private')
 
 
+def test_keys_that_come_with_where_a_machine_begins_are_in_its_userdata():
+    machine, given = watched(Scripted(), Scripted()).machine, smach.UserData()
+    given.x = 1
+    machine.set_initial_state(['B'], given)
+    assert machine.get_initial_states() == ['B'] and machine.userdata.x == 1
+
+
 def test_writes_to_userdata_pass_a_gate_until_it_is_shut():
     machine, late = chain_of(Scripted()), []
     machine.userdata.x, machine.userdata.y = 1, 2
