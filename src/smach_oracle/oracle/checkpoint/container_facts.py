@@ -34,7 +34,6 @@ from smach_oracle.store.rows import Fact
 
 from ..machine.container_records import ContainerRecords
 from ..records.history import History
-from ..records.visits import Visit
 from ..smach_private import remapping_of, states_of
 from .stored_tree import StoredContainer
 
@@ -63,7 +62,6 @@ class ContainerFacts:
         self._stored: Dict[str, str] = {}  # texts by name
         self._ways: Dict[str, Dict[str, object]] = {}  # by label
         self._marks: Dict[str, List[object]] = {}  # by label
-        self._latest: Optional[Visit] = None  # that is stored
         self._visits = before.visits_of_execution  # that are stored
 
     def begin_execution(self) -> Iterator[Fact]:
@@ -91,7 +89,7 @@ class ContainerFacts:
                 }
                 yield from self._if_new(STATE + label, told)
                 ways, stored = record.way_results(), self._ways.get(label, _NOTHING)
-                if ways is not stored and (ways or stored):  # most visits add none
+                if ways != stored:  # most visits add none
                     self._ways[label] = ways
                     yield fact_of(self._path, WAYS + label, ways)
 
@@ -115,12 +113,9 @@ class ContainerFacts:
                     yield fact_of(self._path, MARK + label, [*mark, on_retry])
 
     def _new_visits(self, history: History) -> Iterator[Fact]:
-        visits = history.visits
-        total = history.visits_of_execution
-        first = max(self._visits - 1, total - len(visits), 0)
-        if first < min(self._visits, total) and visits[first - total] is self._latest:
-            first += 1  # else an expert has changed it
-        for number in range(first, total):
+        visits, total = history.visits, history.visits_of_execution
+        # with the latest one that is stored: an expert may have changed it
+        for number in range(max(self._visits - 1, total - len(visits)), total):
             state, outcome, result = visits[number - total]
             # as many names as visits are kept, so that the store does not grow with each
             yield from self._if_new(
@@ -128,7 +123,6 @@ class ContainerFacts:
                 [state, outcome, int(result), self._execution, number],
             )
         self._visits = total
-        self._latest = visits[-1] if visits else None
 
     def _if_new(self, name: str, plain: object) -> Iterator[Fact]:
         text = _as_json(plain)
@@ -270,9 +264,8 @@ def _print_of(value: object) -> Optional[bytes]:
 
 def _is_plain(encoded: Encoded) -> bool:
     """Whether a value has no bytes and no arrays: marshal does not tell these apart."""
-    parts, whole = encoded.parts, encoded.whole
-    text = encoded.text or ('' if whole is None else parts[whole].decode('ascii'))
-    return len(parts) == (whole is not None) and '"$b' not in text
+    texts = [(encoded.text or '').encode('ascii'), *encoded.parts.values()]
+    return not any(tag in text for text in texts for tag in (b'"$b', b'"$part'))
 
 
 def keys_of(machine: smach.StateMachine, label: str) -> FrozenSet[str]:
