@@ -79,7 +79,8 @@ class Trial:
 
 def tell() -> Dict[str, List[str]]:
     """Return a line for each thing that is told, by the draws that it comes from."""
-    with tempfile.TemporaryDirectory() as folder, mock.patch.object(smach, 'logdebug', repr):
+    quiet = mock.patch.multiple(smach, logdebug=repr, logwarn=repr, logerr=repr)
+    with tempfile.TemporaryDirectory() as folder, quiet:
         stores = Stores(folder)
 
         def of_userdata(rng: random.Random) -> Iterator[str]:
@@ -230,7 +231,7 @@ def _facts_of(records: ContainerRecords, before: StoredContainer) -> ContainerFa
 
 def _of_facts(rng: random.Random, trial: Trial) -> Iterator[str]:
     """Facts of each kind, and what they come to at moments of their trial."""
-    for _ in range(rng.choice((0, 1, 12, 12))):
+    for _ in range(rng.choice((0, 1, 12, 24))):
         kind = rng.choice(
             ('STATE_START', 'STATE_START', 'DECISION', 'QUERY_OPENED', 'EDIT', 'JUMP')
         )
@@ -241,6 +242,8 @@ def _of_facts(rng: random.Random, trial: Trial) -> Iterator[str]:
     for until in (None, *rng.sample(moments, min(len(moments), 2))):
         tree = trial.read(until)
         yield '{} {}'.format(written(tree.whole), written(tree.goals))
+        above, below = (tree.container(path).keys for path in PATHS[:2])
+        yield str([above.get(key) is not None and above[key] is below.get(key) for key in 'ab'])
         for path, here in sorted(tree.containers.items()):
             place = (sorted(here.labels()), here.phase, here.moved_to, here.jumped_to, here.label)
             yield '{} {} {}'.format(path, written(vars(here)), written(place))
@@ -288,6 +291,9 @@ def _drawn_fact(rng: random.Random, here: str) -> Fact:
             ('mark:' + label, [number, 1, True, False, 'never']),
             ('out:' + rng.choice('ab'), ['file', 'no codec']),
             ('key:' + rng.choice('abc'), number),
+            ('key:' + rng.choice('ab'), [number]),
+            ('key:' + rng.choice('ab'), [number]),
+            ('key:' + rng.choice('ab'), [number]),
             ('key:' + rng.choice('abc'), rng.choice(({'$by': ['none', 1]}, [1], 'text'))),
         )
     )
@@ -342,6 +348,11 @@ def _of_structures(rng: random.Random) -> Iterator[str]:
         structure_of(build(World(each)), rng.choice(('', 'L1')))
         for each in (plan, other, plan_of(rng.randrange(1000), UPSTREAM))
     )
+    odd = smach.StateMachine(['ok', 2])
+    with odd:
+        odd.add('ONE', smach.State(['ok', 2]), {'ok': 'NONE', 2: 2})
+        odd.add('NONE', smach.Iterator(['ok'], [], [], [], 'item', exhausted_outcome='ok'))
+    yield structure_of(odd, '').description
     yield one.id
     yield one.description
     for before, now in ((one, two), (two, one), (one, third), (one, one)):
