@@ -167,8 +167,8 @@ class Checkpointer:
                 node.site.is_line_over(event)
                 and not (event.kind is EventKind.SUPERSEDE and _is_on_its_way(node))
             )
-            or event.seq >= self._seq_stored + SEQ_RESERVE - 1
-            or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
+            or event.seq >= self._seq_stored + SEQ_RESERVE
+            or node.is_oracle(event.target)
         )
 
     def _pending_of(self, node: TreeNode) -> List[Fact]:
@@ -271,7 +271,7 @@ class Checkpointer:
 
     def _where(self, event: Event, node: TreeNode) -> Iterator[Fact]:
         """Yield where the container stands after an event."""
-        kind, label = event.kind, event.state
+        kind, label, data = event.kind, event.state, event.data or {}
         if kind is EventKind.STATE_START:
             path = '{}/{}'.format(node.key, label)
             is_container = isinstance(states_of(node.machine).get(label), smach.Container)
@@ -292,9 +292,9 @@ class Checkpointer:
         ):
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
         elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (node.has(event.target)):
-            yield fact_of(node.key, AT, [event.target, BEFORE, (event.data or {}).get(JUMPED_TO)])
-        elif kind is EventKind.TRANSITION and TAKEN_UP in (event.data or {}):
-            failed, *told = (event.data or {})[TAKEN_UP]
+            yield fact_of(node.key, AT, [event.target, BEFORE, data.get(JUMPED_TO)])
+        elif TAKEN_UP in data:
+            failed, *told = data[TAKEN_UP]
             yield fact_of(node.key, AT, [failed, FAILED, *told])
         elif kind is EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
             yield fact_of(

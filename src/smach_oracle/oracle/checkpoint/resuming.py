@@ -341,7 +341,7 @@ class _Setting:
         tree, state = self._resumption.tree, '{}/{}/'.format(node.key, stored.label)
         jumped_to = next((each for each in places_of(node) if each.path == stored.jumped_to), None)
         way = jump_path_to(node, jumped_to)
-        down = way.entered_places[1:] if way is not None and way.meeting_node is node else ()
+        down = way.entered_places[1:] if way is not None else ()
         # the jump led to the first item of an Iterator
         has_begun = any(tree.container(place.node.key).phase for place in down) or any(
             told.item > 1 for key, told in tree.containers.items() if (key + '/').startswith(state)
@@ -372,16 +372,16 @@ class _Setting:
     def _go_on_elsewhere(self, node: TreeNode, stored: StoredContainer) -> None:
         """Send the machine to where the state stands now that was under way in a container."""
         top = node.top()
-        place = next((each for each in places_of(top) if each.path == stored.moved_to), None)
-        way = jump_path_to(top, place)
+        moved_to = next((each for each in places_of(top) if each.path == stored.moved_to), None)
+        way = jump_path_to(top, moved_to)
         # others may run next to it, which would be left
-        if place is None or way is None or node.runs_beside_others():
+        if way is None or node.runs_beside_others():
             self._ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
         stood.at, at = [way.first_label, BEFORE], stored.at_there
         self._resumed.enter_at(top.records, EntryPoint(top, stood, way.entered_places[1:]))
-        there = StoredContainer(at)
+        there, place = StoredContainer(at), way.entered_places[-1]
         record = place.node.record(place.label)
         self._reopen(record, stored)
         if there.phase == IN:
@@ -391,10 +391,7 @@ class _Setting:
 
     def _ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
         """Have a person asked before a container begins that stood where it cannot go on."""
-        labels, initial = list(node.labels()), initial_label_of(node.machine)
-        if not labels:
-            return
-        label = initial if initial in labels else labels[0]
+        label = initial_label_of(node.machine)
         stored.at, stored.asked = [label, BEFORE], []
         if node.site.is_container:
             self._resumed.enter_at(node.records, EntryPoint(node, stored))
@@ -412,7 +409,7 @@ class _Setting:
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
-        if self._resumption.asks and node.has(label):
+        if self._resumption.asks:
             self._interrupt(node, label, NOT_BEGUN)
 
     def _interrupt(self, node: TreeNode, label: str, text: str) -> None:
@@ -458,7 +455,7 @@ def _is_wrapped_through(state: object) -> bool:
     return (
         wrapper is not None
         and all(
-            inner is None or label in wrapper.branches or _is_wrapped_through(inner)
+            label in wrapper.branches or _is_wrapped_through(inner)
             for label, inner in children_of(wrapper.container).items()
         )
         and (not isinstance(state, smach.Iterator) or can_be_indexed(state))

@@ -220,8 +220,8 @@ class History:
         :raises ValueError: where `told` is none of a history.
         """
 
-        def there(label: Optional[str]) -> Optional[str]:
-            return label if label is not None and has(label) else None
+        def there(label: Any) -> Optional[str]:
+            return label if has(label) else None
 
         try:
             self.unconditioned, self.succeeded, self.succeeded_other = map(there, told[:3])
