@@ -198,8 +198,9 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     way = _jump_path_named(top, resumption.begins_at) if resumption.begins_at else None
     if way is not None:
         stood.at = [way.first_label, BEFORE]
-    elif top.has(stood.label) and stood.sent is not None:
-        way = _jump_path_named(top, stood.jumped_to[len(top.path) + 1 :] or stood.label)
+    elif stood.sent is not None and (stood.moved_to or top.has(stood.label)):
+        sent_to = stood.moved_to or stood.jumped_to
+        way = _jump_path_named(top, sent_to[len(top.path) + 1 :] or stood.label)
     if way is not None:
         leave_unconfirmed(top, way.first_label)
     let_repeat(top, top.settings.resume_repeat, stood.sent)

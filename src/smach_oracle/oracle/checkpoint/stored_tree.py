@@ -231,10 +231,10 @@ class _Reading:
             container.marks[of] = mark[:4]
         elif word == names.AT:
             at = container.at = _plain(value, [])
-            is_sent = fact.kind == names.EDIT
-            container.sent = (cast(List[str], at[3]) if at[3:] else []) if is_sent else None
             if container.phase == names.MOVED:
                 path, at = container.moved_to.rpartition('/')[0], container.at_there
+            is_sent = fact.kind == names.EDIT
+            container.sent = (cast(List[str], at[3]) if at[3:] else []) if is_sent else None
             # it has begun, also where the machine is sent elsewhere later
             if at and at[1] in (names.IN, names.FAILED):
                 there = self._tree.containers.setdefault(path, StoredContainer())

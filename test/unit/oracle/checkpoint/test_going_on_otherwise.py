@@ -1,0 +1,214 @@
+"""A stored trial goes on elsewhere than where it stood, or is over and another one begins."""
+
+import contextlib
+import os
+import shutil
+
+import pytest
+from killed_machines import Diary, KilledMachine, Points, in_a_process
+from killed_trees import ENDS, flat, make
+from test_accepted_stores import DAMAGES, accept
+from test_changed_scripts import flat_before, killed_while_it_runs, nested_after
+from test_never_twice import FLAT, NEVER, ByHand, killed_in, moment_of, oracle_state
+from test_unanswered import Answers, nobody, questions
+
+import smach
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.checkpoint.container_facts import fact_of
+from smach_oracle.store.rows import NewMoment
+from smach_oracle.store.store_file import NewTrial, StoreFile
+
+
+def without(build, label, path=()):
+    """A builder of the same script without one state. It ends where that began."""
+
+    def changed(diary, points):
+        top = machine = build(diary, points)
+        for each in path:
+            machine = machine.get_children()[each]
+        del machine._states[label], machine._transitions[label], machine._remappings[label]
+        for led in machine._transitions.values():
+            led.update({outcome: 'succeeded' for outcome, to in led.items() if to == label})
+        return top
+
+    return changed
+
+
+def trials_of(killed):
+    with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
+        return [each.outcome for each in store.trials('TOP')]
+
+
+# -- sent by hand, and the script changes then
+
+
+@pytest.mark.parametrize('command', [['goto', 'C'], ['goto', 'D', '--repeat', 'C']])
+def test_nothing_moves_where_a_state_that_somebody_has_named_is_gone(tmp_path, command):
+    killed_while_it_runs(tmp_path, flat_before, 'B')
+    after = KilledMachine(tmp_path, without(flat_before, 'C'))
+    begun = after.diary.count('begins')
+    oracle_state(after, *command)
+    told = after.run()
+    assert told.get('ended_by') == 'kept', told
+    assert after.diary.count('begins') == begun
+
+
+def test_a_place_below_that_is_gone_is_named(tmp_path):
+    killed_while_it_runs(tmp_path, nested_after, 'B')
+    after = KilledMachine(tmp_path, without(nested_after, 'C', ['IN']))
+    oracle_state(after, 'goto', 'IN/C')
+    assert "'state:IN/C' is not allowed" in after.run()['error']
+
+
+def test_before_a_state_that_has_moved_a_person_is_asked(tmp_path):
+    """It was sent to B, which lies in a machine of its own now."""
+    before = KilledMachine(tmp_path, flat_before)
+    names = {'B': 'IN/B', 'C': 'IN/C'}
+    assert before.run(kill_at=6) is None
+    oracle_state(before, 'goto', 'B')
+    begun = before.diary.count('begins')
+    after = KilledMachine(tmp_path, nested_after, resume_map=names, on_resume='ask')
+    told = after.run()
+    assert told.get('ended_by') == 'kept', told
+    assert after.diary.count('begins') == begun
+    assert after.run(on_resume='recover')['outcome'] == 'succeeded'
+
+
+@pytest.mark.parametrize('repeats', [[], ['--repeat', 'POUR']])
+def test_sent_to_a_state_that_has_moved_it_repeats_what_somebody_allows(tmp_path, repeats):
+    def moved(diary, points):
+        machine = FLAT(diary, points)
+        kitchen = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+        with kitchen:
+            smach.StateMachine.add('SEE', machine._states['LOOK'], ENDS)
+        kitchen.userdata.done = []
+        machine._states['LOOK'] = kitchen
+        return machine
+
+    killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
+    oracle_state(killed, 'goto', 'LOOK', *repeats)
+    after = KilledMachine(
+        tmp_path / 'killed', moved, resume_map={'LOOK': 'LOOK/SEE'}, on_resume='recover', **NEVER
+    )
+    told = after.run()
+    assert told.get('ended_by') == ('outcome' if repeats else 'kept'), told
+    assert after.diary.count('begins') == {
+        'LOOK': 2,
+        'POUR': 1 + len(repeats) // 2,
+        'CARRY': 1 + len(repeats) // 2,
+    }
+
+
+# -- questions
+
+
+def test_a_question_about_another_state_is_not_taken_up(tmp_path):
+    killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY')
+    with contextlib.closing(StoreFile(killed.store)) as store:
+        asked = fact_of('TOP', 'asked', ['POUR', 'of before'])
+        store.add(1, [NewMoment(0.0, 0, 'MARKS', 'TOP', '', (asked,))])
+    assert killed.run()['outcome'] == 'succeeded', 'it goes on with CARRY, and asks nobody'
+
+
+def test_from_an_earlier_moment_a_question_is_put_anew(tmp_path):
+    """It may have been answered since."""
+    killed = KilledMachine(tmp_path, flat, max_recoveries=0)
+    killed.run(expert=Answers(tmp_path / 'asked', lambda *_: os.kill(os.getpid(), 9)))
+    moment = moment_of(killed, 'QUERY_OPENED', 'B')
+    asked = tmp_path / 'again'
+    for settings in ({}, {'resume_from': moment}):
+        killed.run(expert=Answers(asked, nobody), on_no_answer='stop', kill_at=7, **settings)
+    first, *again = [each[0] for each in questions(tmp_path / 'asked') + questions(asked)]
+    assert first == again[0] != again[1]
+
+
+# -- which trial goes on
+
+
+def test_an_earlier_moment_of_a_trial_that_had_come_to_its_end_is_gone_on_from(tmp_path):
+    killed = KilledMachine(tmp_path, flat)
+    points = KilledMachine(make(tmp_path / 'whole'), flat).run()['points']
+    assert killed.run(kill_at=points) is None
+    told = killed.run(resume_from=moment_of(killed, 'STATE_START', 'C'))
+    assert (told['outcome'], told['events'][0][0]) == ('succeeded', 'RESUMED')
+
+
+def test_a_moment_of_the_trial_before_is_refused(tmp_path):
+    killed = KilledMachine(tmp_path, flat)
+    killed.run()
+    moment = moment_of(killed, 'STATE_START', 'B')
+    killed.run(kill_at=8)
+    assert 'checkpoint.from: {}'.format(moment) in killed.run(resume_from=moment)['error']
+
+
+def test_a_trial_that_was_stopped_before_its_first_moment_does_not_go_on(tmp_path):
+    killed = KilledMachine(tmp_path, flat, on_resume='ask')
+    with contextlib.closing(StoreFile(killed.store)) as store:
+        store.begin_trial(NewTrial('TOP', 'of before', ('', '{}'), 0.0))
+    told = killed.run()
+    assert (told['outcome'], told['events'][0][0]) == ('succeeded', 'TRIAL_START')
+
+
+def test_after_a_loss_the_trial_that_is_left_goes_on(tmp_path):
+    """Its store was put back from a copy, which does not have the next trial."""
+    killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
+    StoreFile(killed.store).close()  # its log goes into the database
+    shutil.copy(killed.store, killed.store + '.copy')
+    for _ in range(2):
+        assert killed.run(expert=ByHand())['outcome'] == 'succeeded'
+    shutil.copy(killed.store + '.copy', killed.store)
+    accept(killed)
+    assert killed.run()['ended_by'] == 'kept'
+    assert trials_of(killed) == ['']
+
+
+def test_who_wants_a_new_trial_after_a_loss_gets_one(tmp_path):
+    killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY', **NEVER)
+    DAMAGES['log gone'](killed)
+    accept(killed)
+    assert killed.run(on_resume='restart')['outcome'] == 'succeeded'
+    assert trials_of(killed) == ['succeeded']
+
+
+# -- without an oracle
+
+
+def observed(folder, kill_at, **settings):
+    """Execute a machine that is only observed, killed at a point."""
+
+    def work():
+        diary, points = Diary(str(folder / 'diary')), Points(kill_at)
+        machine = OracleContainer.wrap(
+            FLAT(diary, points),
+            name='TOP',
+            recover=False,
+            settings=dict(NEVER, checkpoint=str(folder / 'robot.db'), **settings),
+        )
+        machine.events.observers.append(points)
+        return machine.execute()
+
+    return in_a_process(work)
+
+
+def test_without_an_oracle_no_state_is_held_back(tmp_path):
+    assert observed(tmp_path, 14) is None
+    assert Diary(str(tmp_path / 'diary')).count('begins')['CARRY'] == 1
+    assert observed(tmp_path, 0, on_resume='state:POUR') == 'succeeded'
+    assert Diary(str(tmp_path / 'diary')).count('begins') == {'LOOK': 1, 'POUR': 2, 'CARRY': 2}
+
+
+@pytest.mark.parametrize('recover, labels', [(True, {'A'}), (False, {'A', 'ORACLE'})])
+def test_only_the_meta_state_is_no_part_of_the_structure(tmp_path, recover, labels):
+    machine = smach.StateMachine(['succeeded'])
+    with machine:
+        for label in sorted(labels):
+            smach.StateMachine.add(
+                label, smach.CBState(lambda _: 'succeeded', outcomes=['succeeded'])
+            )
+    path = str(tmp_path / 'robot.db')
+    OracleContainer.wrap(machine, recover=recover, settings={'checkpoint': path}).execute()
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        described = store.description(store.trials()[0].structure)
+    assert all(
+        ('"{}":'.format(label) in described) == (label in labels) for label in ('A', 'ORACLE')
+    )
