@@ -7,13 +7,14 @@ import shutil
 import pytest
 from killed_machines import Diary, KilledMachine, Points, in_a_process
 from killed_trees import ENDS, flat, make
+from left_stores import Left
 from test_accepted_stores import DAMAGES, accept
 from test_changed_scripts import flat_before, killed_while_it_runs, nested_after
-from test_never_twice import FLAT, NEVER, ByHand, killed_in, moment_of, oracle_state
+from test_never_twice import FLAT, NEVER, ByHand, chain, killed_in, moment_of, oracle_state
 from test_unanswered import Answers, nobody, questions
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import Expert, OracleContainer
 from smach_oracle.oracle.checkpoint.container_facts import fact_of
 from smach_oracle.store.rows import NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
@@ -212,3 +213,70 @@ def test_only_the_meta_state_is_no_part_of_the_structure(tmp_path, recover, labe
     assert all(
         ('"{}":'.format(label) in described) == (label in labels) for label in ('A', 'ORACLE')
     )
+
+
+# -- numbers of events
+
+
+class Claims(Expert):
+    """Is claimed and released again and again, and ends the program then."""
+
+    def ask(self, question, cancelled, progress):
+        for _ in range(700):
+            progress('claimed', 'ann', '')
+            progress('released', 'ann', '')
+        os.kill(os.getpid(), 9)
+
+
+def test_many_events_between_two_moments_are_numbered_once(tmp_path):
+    killed = KilledMachine(tmp_path, flat, max_recoveries=0)
+    assert killed.run(expert=Claims()) is None
+    with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
+        kinds = [each.kind for each in store.moments(1)]
+    assert len([kind for kind in kinds if kind in ('QUERY_CLAIMED', 'QUERY_RELEASED')]) == 1
+    assert killed.run()['events'][0][1] > 1400
+
+
+# -- a machine that stands under two labels
+
+
+def test_under_the_other_label_what_is_in_a_machine_may_have_been_done(tmp_path):
+    def shared(diary, points):
+        inner = chain('POUR', 'CARRY')(diary, points)
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        with machine:
+            smach.StateMachine.add('ONE', inner, {'succeeded': 'TWO'})
+            smach.StateMachine.add('TWO', inner, ENDS)
+        return machine
+
+    left = Left(shared, **NEVER)
+    killed = left.killed_at(left.first_in('CARRY', times=2), tmp_path / 'killed')
+    begun = killed.diary.count('begins')
+    told = killed.run()
+    assert [text for text in told['log'] if text.startswith('TOP/TWO: the program was stopped')]
+    assert killed.diary.count('begins') == begun
+
+
+# -- without a store
+
+
+def test_wrapped_again_without_a_store_a_machine_waits_for_none(tmp_path, log):
+    failed = []
+
+    def fails_once(userdata):
+        failed.append(1)
+        return 'aborted' if len(failed) % 2 else 'succeeded'
+
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    with machine:
+        carry = smach.CBState(fails_once, outcomes=['succeeded', 'aborted'])
+        pour = smach.CBState(lambda _: 'succeeded', outcomes=['succeeded'])
+        smach.StateMachine.add('CARRY', carry)
+        smach.StateMachine.add('POUR', pour, {'succeeded': 'CARRY'})
+    states = {'POUR': {'on_retry': 'never'}, 'CARRY': {'preconditions': ['POUR']}}
+    path = str(tmp_path / 'robot.db')
+    for store in ({'checkpoint': path, 'checkpoint_wait_s': 0.1}, {}):
+        OracleContainer.wrap(machine, settings=dict(store, states=states))
+        assert machine.execute() == 'succeeded'
+    assert not [text for _, text in log if path in text and 'what is not stored' in text]
