@@ -4,6 +4,7 @@ import json
 import os
 import random
 import signal
+import stat
 import subprocess
 import sys
 import time
@@ -303,6 +304,23 @@ def test_a_full_disk_leaves_the_old_file_and_no_litter(tmp_path, monkeypatch, lo
     assert path.read_text() == before
     assert os.listdir(tmp_path) == ['rates.json']
     assert any('No space left' in text for level, text in log if level == 'warn')
+
+
+def test_a_file_that_anybody_may_read_is_synced_as_a_whole_and_then_its_folder(
+    tmp_path, monkeypatch
+):
+    path, synced, fsync = tmp_path / 'rates.json', [], os.fsync
+
+    def noting(descriptor):
+        found = os.fstat(descriptor)
+        synced.append('folder' if stat.S_ISDIR(found.st_mode) else found.st_size)
+        fsync(descriptor)
+
+    monkeypatch.setattr(os, 'fsync', noting)
+    learned_machine(path).run()
+    written = path.stat()
+    assert synced[-2:] == [written.st_size, 'folder']
+    assert stat.S_IMODE(written.st_mode) == 0o644
 
 
 WRITER = """

@@ -1,5 +1,6 @@
 """Goals that a killed program has left running are ended before anything is sent."""
 
+import contextlib
 import os
 import signal
 
@@ -7,7 +8,9 @@ from killed_machines import KilledMachine, Noted
 from killed_trees import ENDS
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.running_goals import GOALS
+from smach_oracle.store.store_file import StoreFile
 
 
 class Sends(Noted):
@@ -85,3 +88,28 @@ def test_a_goal_that_has_ended_when_the_next_state_begins_is_forgotten(tmp_path)
     assert killed.run() is None
     assert killed.diary.count('ends')['look of /camera'] == 0
     assert killed.diary.count('ends')['reach of /arm'] == 1
+
+
+def test_a_goal_is_stored_as_it_is_sent_and_once_it_has_ended(tmp_path):
+    def sends(userdata):
+        GOALS.begin('look', '/camera')
+        GOALS.end('look')
+        return 'succeeded'
+
+    machine = smach.StateMachine(['succeeded'])
+    with machine:
+        for label, following in (('A', 'B'), ('B', 'succeeded')):
+            state = smach.CBState(sends, outcomes=['succeeded'])
+            smach.StateMachine.add(label, state, {'succeeded': following})
+    path = str(tmp_path / 'robot.db')
+    for _ in range(2):
+        OracleContainer.wrap(machine, settings={'checkpoint': path}).execute()
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        for trial in (1, 2):
+            facts = [each for each in store.facts(trial) if each.name == 'goal:look']
+            assert [(each.kind, each.value.text) for each in facts] == [
+                ('GOAL', '"/camera"'),
+                ('STATE_START', None),
+                ('GOAL', '"/camera"'),
+                ('TRIAL_END', None),
+            ]
