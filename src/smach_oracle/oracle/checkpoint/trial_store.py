@@ -145,7 +145,7 @@ class TrialStore:
         if (
             lost is None
             or self._top.settings.on_resume[0] == RESTART
-            or (last is not None and last.number > lost)  # one that can go on is numbered anew
+            or (last is not None and last.number > lost)  # one that can go on is behind it
         ):
             return last
         now = time.time()
