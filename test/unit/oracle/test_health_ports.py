@@ -235,3 +235,31 @@ def test_who_asks_while_another_asks_waits_for_its_turn():
     calls.append(in_thread(lambda: watch.why_unwell(Scope())))
     go.set()
     assert [call.result() for call in calls] == ['is_well: off'] * 2
+
+
+def test_who_waits_for_its_turn_does_not_look_all_the_time():
+    class Counted(Scope):
+        def wait(self, seconds=None, until=None):
+            waits.append(until)
+            if len(waits) > 2:
+                spins.set()
+            return Scope.wait(self, seconds, until)
+
+    def is_well():
+        entered.set()
+        assert go.wait(20)
+        return True
+
+    entered, go, spins, waits = threading.Event(), threading.Event(), threading.Event(), []
+    watch = health_watch.HealthWatch(is_well)
+    watch.use((), 0.0)
+    go.set()
+    assert watch.why_unwell(Scope()) == ''
+    go.clear()
+    entered.clear()
+    calls = [in_thread(lambda: watch.why_unwell(Scope()))]
+    assert entered.wait(20)
+    calls.append(in_thread(lambda: watch.why_unwell(Counted())))
+    assert wait_for(lambda: waits) and not spins.wait(0.2)
+    go.set()
+    assert [call.result() for call in calls] == ['', '']

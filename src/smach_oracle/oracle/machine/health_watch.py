@@ -46,7 +46,7 @@ class HealthFunctionPort:
         self._name = name
         self._function = function
         self._call: Optional[BackgroundCall] = None
-        self._since_s = 0.0
+        self._since_s: float  # of the call
 
     def why_unwell(self, scope: Scope) -> str:
         """Return what is wrong, '' where all is well, also where `scope` ends the asking."""
@@ -56,13 +56,12 @@ class HealthFunctionPort:
             self._since_s = now()
             call = self._call = BackgroundCall(self._function, 'smach_oracle health')
             call.start()
-        if not scope.wait(self._since_s + FUNCTION_LIMIT_S - now(), call.done):
-            is_late = now() >= self._since_s + FUNCTION_LIMIT_S
-            return '{} does not return'.format(self._name) if is_late else ''
-        self._call = None
-        if now() > self._since_s + FUNCTION_LIMIT_S:
-            return '{} took too long'.format(self._name)
-        return self._in_words(call)
+        until_s = self._since_s + FUNCTION_LIMIT_S
+        has_returned = scope.wait(until_s - now(), call.done)
+        if now() >= until_s:
+            why = '{} took too long' if has_returned else '{} does not return'
+            return why.format(self._name)
+        return self._in_words(call) if has_returned else ''
 
     def _in_words(self, call: BackgroundCall) -> str:
         if call.error is not None:
@@ -108,8 +107,7 @@ class HealthWatch:
         self._lock = threading.RLock()
         self._asking = threading.Lock()
         self._asked = Flag()  # by the thread that has asked last
-        self._conditions: Tuple[HealthCondition, ...] = ()
-        self._settle_s = 0.0
+        self._settle_s: float  # in force
         self._functions: List[HealthFunctionPort] = []
         self._listening: Optional[HealthPort] = None
         self._made_of: object = None
