@@ -1,8 +1,8 @@
-"""A shallow copy of a machine has settings of its own."""
+"""A shallow copy of a machine has settings and records of its own. What `add` was given."""
 
 import copy
 
-from machines import Scripted
+from machines import Scripted, chain_of
 
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.machine.tree_node import node_of
@@ -17,3 +17,31 @@ def test_settings_given_with_add_to_a_copy_are_not_those_of_the_machine():
         OracleContainer.add('B', Scripted(), prior=0.3)
     assert [node_of(each).settings_of('A').prior for each in (machine, twin)] == [0.2, 0.2]
     assert [node_of(each).settings_of('B').prior for each in (machine, twin)] == [0.1, 0.3]
+
+
+def test_what_is_set_from_outside_wins_over_what_add_was_given_and_the_rest_stays():
+    machine = OracleContainer(
+        ['ok', 'aborted', 'preempted'], settings={'states': {'A': {'prior': 0.4}}}
+    )
+    with machine:
+        OracleContainer.add('A', Scripted(), prior=0.2, time_limit_s=3.0)
+    settings = node_of(machine).settings_of('A')
+    assert (settings.prior, settings.time_limit_s) == (0.4, 3.0)
+
+
+def test_a_copy_learns_on_its_own_from_what_the_machine_had_learned(tmp_path):
+    path = str(tmp_path / 'rates.json')
+    other = OracleContainer.wrap(chain_of(Scripted('aborted')))
+    assert other.execute() == 'done'
+    other.save_rates(path)
+    machine = OracleContainer.wrap(chain_of(Scripted('aborted', 'aborted')))
+    machine.load_rates(path)
+    first = copy.copy(machine)
+    assert machine.execute() == 'done'
+    assert [row.failures for each in (machine, first) for row in each.rates()] == [3, 1]
+    second, counts = copy.copy(machine), machine.transition_counts()
+    assert second.transition_counts() == counts
+    machine.get_children()['A'].script = ['aborted']
+    assert second.execute() == 'done'
+    assert machine.transition_counts() == counts != second.transition_counts()
+    assert [row.failures for each in (machine, second) for row in each.rates()] == [3, 4]

@@ -321,6 +321,20 @@ def test_a_machine_that_is_entered_for_its_clean_up_is_no_work_though_it_has_run
     assert trail.ran == ['X', 'BACK', 'CLEAN']
 
 
+def test_what_a_machine_has_obeyed_in_an_earlier_trial_counts_no_more():
+    def stop(state, ud):
+        watched.machine.request_preempt()
+        state.service_preempt()
+        return 'preempted'
+
+    a, x = Scripted('ok', stop), Scripted(stop, 'aborted')
+    inner = machine_of(X=(x, {'ok': 'done'}))
+    outer = machine_of(A=(a, {'ok': 'N', 'preempted': 'N'}), N=(inner, {}))
+    watched = Watched(outer, settings={'max_recoveries': 9})
+    assert [watched.run(), watched.run()] == ['preempted', 'aborted']
+    assert (a.runs, x.runs) == (2, 2)
+
+
 def test_a_preempt_is_not_obeyed_by_what_its_author_drew_after_a_failure():
     """The machine goes on, as it has no other way, and the request stays."""
 

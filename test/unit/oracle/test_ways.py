@@ -151,6 +151,20 @@ def test_a_streak_goes_on_where_its_own_way_has_left_the_container():
     assert machine.visits() == [*home, *again, *home, 'LOOK', 'GRASP']
 
 
+def test_the_next_trial_begins_a_streak_that_a_way_had_left_anew():
+    def stop(state, ud):
+        machine.machine.request_preempt()
+        state.service_preempt()
+        return 'preempted'
+
+    machine = nested(Scripted(*FAILS[:4]))
+    machine.machine.get_children()['HOME'].script = ['ok', stop]
+    assert machine.run() == 'preempted'
+    assert orders(machine) == ['again', 'wait 10 s', 'from /HOME']
+    assert machine.run() == 'done'
+    assert orders(machine)[3:] == ['again']
+
+
 def test_a_way_out_is_blocked_where_the_author_goes_on_from_there():
     inner = Scripted(*FAILS)
     get = smach.StateMachine(outcomes=ENDS)
