@@ -2,8 +2,9 @@
 
 import copy
 
-from machines import Scripted, chain_of
+from machines import Scripted, Watched, chain_of
 
+import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.machine.tree_node import node_of
 
@@ -45,3 +46,19 @@ def test_a_copy_learns_on_its_own_from_what_the_machine_had_learned(tmp_path):
     assert second.execute() == 'done'
     assert machine.transition_counts() == counts != second.transition_counts()
     assert [row.failures for each in (machine, second) for row in each.rates()] == [3, 4]
+
+
+def test_a_copy_that_runs_in_the_same_trial_fails_on_its_own():
+    def run_copy(state, ud):
+        return 'ok' if copy.copy(inner).execute() == 'done' else 'aborted'
+
+    inner = chain_of(Scripted(), Scripted('aborted', 'ok', 'aborted', 'ok', 'aborted'))
+    top = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with top:
+        smach.StateMachine.add('N', inner, {'done': 'COPY'})
+        smach.StateMachine.add('COPY', Scripted(run_copy), {'ok': 'MORE'})
+        more = Scripted('again', outcomes=('ok', 'again'))
+        smach.StateMachine.add('MORE', more, {'again': 'N', 'ok': 'done'})
+    machine = Watched(top, settings={'policy': 'prose'})
+    assert machine.run() == 'done'
+    assert machine.decisions() == [('revisit', 'B')] * 3

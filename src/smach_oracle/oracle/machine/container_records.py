@@ -72,7 +72,7 @@ class ContainerSettings:
         own = self.given_with_add.get(label)
         settings = self.of_machine
         if own:
-            settings = settings.with_states({label: {**own, **(settings.states.get(label) or {})}})
+            settings = settings.with_states({label: {**own, **settings.states.get(label, {})}})
         return settings.for_state(path, label)
 
 
@@ -82,9 +82,9 @@ class ContainerRecords:
     `by_label` holds the records of the states that were needed so far.
     """
 
-    def __init__(self, history_length: int) -> None:
+    def __init__(self, history: History) -> None:
         self.by_label: Dict[str, StateRecord] = {}
-        self.history = History(history_length)
+        self.history = history
         self.marks = VisitMarks()
         self.streaks = Streaks()
         # before a stop that was obeyed, each with the snapshot of its latest entry
@@ -242,12 +242,8 @@ class ContainerRecords:
 
     def twin(self) -> 'ContainerRecords':
         """Return records for a shallow copy of the machine, which learns on its own."""
-        twin = copy.copy(self)
+        twin = ContainerRecords(copy.deepcopy(self.history))
         twin.by_label = copy.deepcopy(self.by_label)
-        twin.history = copy.deepcopy(self.history)
-        twin.marks = VisitMarks()
-        twin.streaks = Streaks()
-        twin.take_up_work()
         twin.oracle_edges = dict(self.oracle_edges)
         twin.to_come = dict(self.to_come)
         return twin

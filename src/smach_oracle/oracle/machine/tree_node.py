@@ -6,6 +6,7 @@ from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
 import smach
 
 from ..records.events import EventKind
+from ..records.history import History
 from ..settings.names import is_nested_at
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import EngineProbe, Labels, data_of, is_executing, mark_of, mark_on, states_of
@@ -58,7 +59,7 @@ class TreeNode:
         self.parent: Optional['TreeNode'] = None
         self.labels_from_parent: Labels = ()
         self.in_force = ContainerSettings(settings, name)
-        self.records = ContainerRecords(settings.history_length)
+        self.records = ContainerRecords(History(settings.history_length))
         self.engine = EngineProbe()
         self.site = site(self)
         self.join(tree)
