@@ -30,6 +30,13 @@ def test_what_is_set_from_outside_wins_over_what_add_was_given_and_the_rest_stay
     assert (settings.prior, settings.time_limit_s) == (0.4, 3.0)
 
 
+def test_a_state_that_was_added_as_guarded_is_not_repeated():
+    machine = OracleContainer(['ok', 'aborted', 'preempted'])
+    with machine:
+        OracleContainer.add('A', Scripted('aborted'), on_retry='confirm')
+    assert machine.execute() == 'aborted'
+
+
 def test_a_copy_learns_on_its_own_from_what_the_machine_had_learned(tmp_path):
     path = str(tmp_path / 'rates.json')
     other = OracleContainer.wrap(chain_of(Scripted('aborted')))

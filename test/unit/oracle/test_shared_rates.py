@@ -15,6 +15,7 @@ from machines import Scripted, Watched, chain_of
 
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS, base_of, merged
+from smach_oracle.oracle.machine import container_records
 from smach_oracle.oracle.records import folder_locks as lock_module
 from smach_oracle.oracle.records.folder_locks import folder_lock
 
@@ -337,3 +338,36 @@ def test_a_failure_that_is_taken_back_is_taken_out(kind):
     found = merged(mine.snapshot(), base, others, 5)
     assert (found['successes'], found['failures']) == (2, 0)
     assert found.get('window', [0, 0]) == [0, 0] and found.get('rate', 0) < 0.1
+
+
+@pytest.fixture
+def meanwhile(monkeypatch):
+    """A list of what happens, once, while the record of a state with learned rates is made."""
+    things, base = [], container_records.base_of
+
+    def after_things(rates):
+        while things:
+            things.pop()()
+        return base(rates)
+
+    monkeypatch.setattr(container_records, 'base_of', after_things)
+    return things
+
+
+def test_what_others_have_learned_while_a_record_is_made_is_added_once(tmp_path, meanwhile):
+    path = tmp_path / 'rates.json'
+    other = machine(path, 'TASK', ['aborted'])
+    other.run()
+    own = machine(path, 'TASK', [])
+    meanwhile += [lambda: own.machine.load_rates(str(path)), other.run]
+    assert own.rate('A').successes == 2
+    own.run()
+    assert learned(path, 'TASK') == (3, 1) and not meanwhile
+
+
+def test_a_record_that_a_reader_makes_too_late_is_forgotten_with_its_rates(tmp_path, meanwhile):
+    path = tmp_path / 'rates.json'
+    machine(path, 'TASK', ['aborted']).run()
+    own = machine(path, 'TASK', [])
+    meanwhile.append(own.run)
+    assert [own.rate('A').successes for _ in range(2)] == [2, 2] and not meanwhile

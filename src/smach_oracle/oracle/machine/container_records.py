@@ -35,7 +35,8 @@ class ContainerSettings:
     def use(self, settings: Settings) -> None:
         """Put settings of the whole machine into force. Those given with `add()` stay."""
         self.of_machine = settings
-        self.checked_states = -1  # number of states for which they were last checked
+        # number of states for which they were last checked, None where they were not
+        self.checked_states: Optional[int] = None
         self.policy: Policy = policy_named(settings.policy, settings.policy_parameters)
         self.rule = FailureRule(settings.failing_outcomes)
         self.failing = self.rule.failing
