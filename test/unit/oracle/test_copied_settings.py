@@ -31,9 +31,10 @@ def test_what_is_set_from_outside_wins_over_what_add_was_given_and_the_rest_stay
 
 
 def test_a_state_that_was_added_as_guarded_is_not_repeated():
-    machine = OracleContainer(['ok', 'aborted', 'preempted'])
+    machine = OracleContainer(['ok', 'aborted', 'preempted'], settings={'policy': 'restart'})
     with machine:
-        OracleContainer.add('A', Scripted('aborted'), on_retry='confirm')
+        OracleContainer.add('A', Scripted(), {'ok': 'B'}, on_retry='confirm')
+        OracleContainer.add('B', Scripted('aborted'))
     assert machine.execute() == 'aborted'
 
 
