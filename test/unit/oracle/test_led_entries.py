@@ -3,9 +3,9 @@
 import copy
 import threading
 
-from guarded_machines import chain
+from guarded_machines import OUTCOMES, chain
 from held_machines import Held
-from machines import FakeExpert, Scripted, goto, watched
+from machines import FakeExpert, Scripted, Watched, goto, watched
 from test_still_running import asked
 
 import smach
@@ -136,3 +136,18 @@ def test_who_wraps_it_again_on_the_way_changes_nothing_of_where_it_is_led():
     expert = FakeExpert(goto('Y', container='SM_ROOT/PICK'))
     held = Held(machine, expert=expert, settings=dict(ASKS, still_running_s=0))
     assert held.run() == 'done' and held.visits() == ['FIND', 'PICK', 'Y']
+
+
+def test_a_watched_machine_that_was_entered_in_its_middle_begins_at_its_start_the_next_time():
+    machine = smach.StateMachine(outcomes=OUTCOMES)
+    place = Scripted('aborted', 'again', outcomes=('ok', 'again', 'aborted'))
+    with machine:
+        pick = chain(B=Scripted(), C=Scripted())
+        smach.StateMachine.add('PICK', pick, {'done': 'PLACE'})
+        smach.StateMachine.add('PLACE', place, {'ok': 'done', 'again': 'PICK'})
+    expert = FakeExpert(goto('C', container='TOP/PICK'))
+    settings = {**ASKS, 'deep_copy_keys': ['any']}
+    watched = Watched(machine, name='TOP', expert=expert, settings=settings)
+    assert watched.run() == 'done'
+    led, whole = ['PICK', 'C', 'PLACE'], ['PICK', 'B', 'C', 'PLACE']
+    assert watched.visits() == [*whole, *led, *whole]

@@ -1,7 +1,7 @@
 """An item that is done again finds the userdata as they were when it began, and is an event."""
 
 import pytest
-from machines import FakeExpert, Scripted, Watched, goto
+from machines import FakeExpert, Scripted, Watched, goto, supersede
 
 import smach
 from smach_oracle.oracle.records.events import EventKind
@@ -222,3 +222,11 @@ def test_what_is_given_from_above_replaces_it_where_that_is_not_as_before(
     states = {'ALL': {'preconditions': [writes]}}
     total_of(machine, states=states, deep_copy_keys=copied)
     assert machine.userdata.names == left
+
+
+def test_one_that_has_failed_after_its_last_item_begins_again():
+    each = Scripted()
+    iterator = over(each, items=(1, 2))
+    iterator._exhausted_outcome = 'aborted'
+    total_of(machine_of(iterator), goto('ALL'), supersede('done'), max_recoveries=0)
+    assert each.runs == 4

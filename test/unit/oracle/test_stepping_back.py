@@ -184,3 +184,15 @@ def test_a_level_above_that_decides_may_step_back_further_still():
     assert decided(machine)[-1] == ('TOP/PICK', 'step_back', 'TOP/FIND')
     assert machine.rate('ARM').failures == 1
     assert machine.visits()[-4:] == ['FIND', 'PICK', 'ARM', 'GRASP']
+
+
+def test_no_state_of_an_earlier_execution_of_the_container_is_stepped_back_to():
+    states = {'A': Scripted('ok', 'aborted'), 'B': Scripted(), 'C': Scripted()}
+    more = Scripted('again', outcomes=('ok', 'again'))
+    top = smach.StateMachine(outcomes=OUTCOMES)
+    with top:
+        smach.StateMachine.add('N', chain(**states), {'done': 'MORE'})
+        smach.StateMachine.add('MORE', more, {'again': 'N', 'ok': 'done'})
+    machine = Watched(top, settings={'policy': 'algorithm1'})
+    assert machine.run() == 'done'
+    assert machine.visits() == ['N', 'A', 'B', 'C', 'MORE', 'N', 'A', 'A', 'B', 'C', 'MORE']

@@ -151,6 +151,19 @@ def test_a_streak_goes_on_where_its_own_way_has_left_the_container():
     assert machine.visits() == [*home, *again, *home, 'LOOK', 'GRASP']
 
 
+def test_a_streak_ends_with_the_execution_of_its_container():
+    def stop(state, ud):
+        get.request_preempt()
+        state.service_preempt()
+        return 'preempted'
+
+    machine = nested(Scripted('aborted', stop, 'aborted'))
+    get = machine.machine.get_children()['GET']
+    machine.machine._transitions['GET']['preempted'] = 'HOME'
+    assert machine.run() == 'done'
+    assert orders(machine) == ['again', 'again']
+
+
 def test_the_next_trial_begins_a_streak_that_a_way_had_left_anew():
     def stop(state, ud):
         machine.machine.request_preempt()

@@ -277,3 +277,11 @@ def test_a_machine_with_a_loop_of_its_own_takes_one_step_at_a_time(wrap):
         smach.StateMachine.add('A', state, {'again': 'A'})
     assert wrap(machine).execute() == 'paused'
     assert state.runs == 5
+
+
+def test_what_was_learned_stays_under_other_settings():
+    machine = watched(Scripted('aborted'))
+    assert machine.run() == 'done'
+    OracleContainer.wrap(machine.machine, settings={'memory': 3, 'prior': 0.2})
+    row = machine.rate('A')
+    assert (row.successes, row.failures) == (1, 1)
