@@ -165,6 +165,34 @@ def test_what_an_unmet_precondition_changed_inside_a_deep_copied_key_is_taken_ba
     assert machine.userdata.x == ['at the start']
 
 
+@pytest.mark.parametrize('is_met_before', [False, True])
+def test_what_was_taken_back_in_a_deep_copied_key_does_not_count_as_written(is_met_before):
+    def add(state, ud):
+        seen.append(list(ud.x))
+        ud.x.append('a')
+        return 'ok'
+
+    before = [lambda ud: ud.x.append('achieved') or True]
+    seen, machine = [], chain_of(Scripted(add, add, **IO), Scripted('aborted', **IO))
+    machine.userdata.x = ['start']
+    Watched(
+        machine,
+        preconditions={'B': before * is_met_before + [lambda ud: ud.x.append('half achieved')]},
+        settings={'deep_copy_keys': ['x'], 'policy': 'algorithm1', 'prior': 0.5},
+    ).run()
+    again = ['start', 'a', 'achieved'] if is_met_before else ['start']
+    assert seen == [['start'], again]
+
+
+def test_an_unmet_one_leaves_the_object_under_a_deep_copied_key_where_it_did_not_change_it():
+    machine = chain_of(Scripted(), Scripted('aborted', **IO), Scripted())
+    machine.userdata.x = x = ['at the start']
+    asked, settings = [], {'deep_copy_keys': ['x', 'absent'], 'userdata': 'keep'}
+    preconditions = {'B': [lambda ud: asked.append(ud.x)]}
+    Watched(machine, preconditions=preconditions, settings={**settings, 'prior': 0.5}).run()
+    assert asked[0] is machine.userdata.x is x
+
+
 def test_what_a_met_one_changed_there_before_stays():
     machine = chain_of(Scripted(), Scripted('aborted', **IO), Scripted())
     machine.userdata.x = ['at the start']

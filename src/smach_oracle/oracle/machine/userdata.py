@@ -36,6 +36,7 @@ from ..smach_private import (
     states_of,
 )
 
+_GONE = object()  # in place of the value of a key that is not there
 NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
 
@@ -218,7 +219,7 @@ class WriteWatch:
             return
         for key, value in begun.data.items():
             if key in begun.prints and fingerprint(value) != begun.prints[key]:
-                if self._before.get(key) is value and self._prints.get(key) == begun.prints[key]:
+                if self._before.get(key) is value:
                     self._before[key] = begun.copies[key]
                 value = begun.copies[key]
             data[key] = value
@@ -244,14 +245,11 @@ class WriteWatch:
         """Return the keys set, deleted or changed so far."""
         now, before = dict(data_of(self._machine.userdata)), self._before
         keys = self._kept.union(self.gate.written)
-        for key, value in now.items():
-            if key not in before or before[key] is not value:
-                keys.add(key)
-        for key in before:
-            if key not in now:
+        for key in {**now, **before}:
+            if now.get(key, _GONE) is not before.get(key, _GONE):
                 keys.add(key)
         for key, seen in self._prints.items():
-            if key in now and fingerprint(now[key]) != seen:
+            if fingerprint(now.get(key)) != seen:  # one that is gone was found above
                 keys.add(key)
         return keys
 
