@@ -442,3 +442,15 @@ def test_the_expert_may_be_attached_later():
     machine = Watched(chain_of(Scripted('aborted')), settings={'max_recoveries': 0})
     machine.machine.expert = FakeExpert(supersede('ok'))
     assert machine.run() == 'done'
+
+
+def test_the_questions_of_each_trial_are_numbered():
+    machine, expert = asking(goto('C'), goto('NOWHERE'), goto('C'))
+    machine.machine.get_children()['B'].script *= 2
+    trials = []
+    for _ in range(2):
+        assert machine.run() == 'done'
+        trials.append(machine.machine.trial_id)
+    first, second = trials
+    numbered = [first + '-1', second + '-1', second + '-2']
+    assert [question.question_id for question in expert.questions] == numbered

@@ -1,11 +1,13 @@
 """A shallow copy of a machine has settings and records of its own. What `add` was given."""
 
 import copy
+import pickle
 
+from forked import Fork
 from machines import Scripted, Watched, chain_of
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.machine.tree_node import node_of
 
 
@@ -70,3 +72,31 @@ def test_a_copy_that_runs_in_the_same_trial_fails_on_its_own():
     machine = Watched(top, settings={'policy': 'prose'})
     assert machine.run() == 'done'
     assert machine.decisions() == [('revisit', 'B')] * 3
+
+
+class Plain(smach.State):
+    """It can be pickled, and ends well."""
+
+    def __init__(self):
+        smach.State.__init__(self, outcomes=['ok'])
+
+    def execute(self, ud):
+        return 'ok'
+
+
+def test_a_machine_that_was_pickled_in_another_process_is_this_ones():
+    def pickled():
+        try:
+            return pickle.dumps(OracleContainer.wrap(chain_of(Plain())))
+        except TypeError:  # this engine cannot pickle machines
+            return None
+
+    fork = Fork()
+    if fork.inside:
+        fork.end_with(pickled)
+    fork.wait()
+    made = fork.answer()
+    if made is not None:
+        machine = pickle.loads(made)
+        assert not oracle_of(machine).is_parents
+        assert machine.execute() == 'done' and machine.rates()[0].successes == 1

@@ -11,7 +11,8 @@ import smach
 from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.ways import BY_PERSON, FIRST, LATER, WayResult
 from smach_oracle.oracle.machine.nesting import marked_node, settle_ways
-from smach_oracle.oracle.machine.state_record import StateRecord
+from smach_oracle.oracle.machine.state_record import FastEdge, StateRecord
+from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.records.way_results import (
     MOST_FAILURES,
     MOST_RESULTS,
@@ -380,3 +381,16 @@ def test_records_of_earlier_versions_are_read():
     record = StateRecord('A', StateSettings())
     record.restore({'estimator': 'window', 'successes': 2, 'failures': 1, 'window': [1, 0, 0]})
     assert record.ways_so_far() == () and 'ways' not in record.learned()
+
+
+def test_a_record_goes_on_behind_what_a_stored_trial_has_counted():
+    record = StateRecord('A', StateSettings())
+    edge = FastEdge('B', 'B', 'A:ok-->B', Visit('A', 'ok', VisitResult.SUCCESS))
+    record.fast['ok'] = edge
+    record.visit_ended()
+    edge.count = 2
+    record.go_on([7, 1, 2, 3], 0.5)
+    assert (record.visits, record.longest_s) == (7, 0.5)
+    assert (record.recoveries, record.fallbacks, record.unwell_repeats) == (1, 2, 3)
+    record.visit_ended()
+    assert record.visits == 8

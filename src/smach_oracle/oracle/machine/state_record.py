@@ -250,8 +250,7 @@ class StateRecord:
         self._tried = _NOTHING_TRIED
         if self._ways.gone is not None:
             self.settle_way(None)
-        if self.special:
-            self.forget_entry()  # of the machine of which this is a copy
+        self.forget_entry()  # of the machine of which this is a copy
         self._visits_before = self._visits + self._by_edges()
 
     @property
