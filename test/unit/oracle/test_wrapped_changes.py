@@ -3,7 +3,8 @@
 import inspect
 
 import pytest
-from machines import FakeExpert, Scripted, chain_of, contents, goto, supersede, watched
+from guarded_machines import chain
+from machines import FakeExpert, Scripted, Watched, chain_of, contents, goto, supersede, watched
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -285,3 +286,16 @@ def test_what_was_learned_stays_under_other_settings():
     OracleContainer.wrap(machine.machine, settings={'memory': 3, 'prior': 0.2})
     row = machine.rate('A')
     assert (row.successes, row.failures) == (1, 1)
+
+
+def test_a_jump_into_a_machine_arrives_though_it_was_wrapped_again_on_the_way():
+    def wrap_again(event):
+        if event.kind is EventKind.JUMP:
+            OracleContainer.wrap(machine.machine, settings={'memory': 5})
+
+    states = {'PICK': chain(B=Scripted(), C=Scripted()), 'PLACE': Scripted('aborted')}
+    expert, settings = FakeExpert(goto('C', container='TOP/PICK')), {'max_recoveries': 0}
+    machine = Watched(chain(**states), name='TOP', expert=expert, settings=settings)
+    machine.machine.events.observers.append(wrap_again)
+    assert machine.run() == 'done'
+    assert machine.visits() == ['PICK', 'B', 'C', 'PLACE', 'PICK', 'C', 'PLACE']

@@ -149,8 +149,7 @@ class Site:
 
     def ended_by(self, event: Event) -> Optional[str]:
         """Return the outcome with which it ends at an event of its own, None for other events."""
-        is_end = event.kind is EventKind.CONTAINER_END and event.outcome
-        return event.outcome if is_end else None
+        return event.kind is EventKind.CONTAINER_END and event.outcome or None
 
     def is_line_over(self, event: Event) -> bool:
         """Whether no state follows in its thread, that of a Concurrence, after an event."""

@@ -248,8 +248,7 @@ class StateRecord:
         """Count the visits and recoveries of a new trial."""
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
         self._tried = _NOTHING_TRIED
-        if self._ways.gone is not None:
-            self.settle_way(None)
+        self.settle_way(None)
         self.forget_entry()  # of the machine of which this is a copy
         self._visits_before = self._visits + self._by_edges()
 
