@@ -73,7 +73,8 @@ class ContainerSettings:
         own = self.given_with_add.get(label)
         settings = self.of_machine
         if own:
-            settings = settings.with_states({label: {**own, **settings.states.get(label, {})}})
+            outside: Mapping[str, object] = settings.states.get(label, {})
+            settings = settings.with_states({label: {**own, **outside}})
         return settings.for_state(path, label)
 
 
