@@ -179,7 +179,7 @@ def why_repeats(recovery: Recovery, option: Option) -> str:
 def function_that_runs(recovery: Recovery) -> str:
     """Return which function among the preconditions was left behind and runs, '' for none."""
     workers = recovery.node.tree.workers
-    for spec in recovery.record.settings.preconditions if workers.abandoned else ():
+    for spec in recovery.record.settings.preconditions:
         for name, function in spec.functions():
             why = workers.blocked(function)
             if why:

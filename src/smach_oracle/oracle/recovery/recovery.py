@@ -1,7 +1,7 @@
 """One recovery under way: what its phases share, and how it ends early."""
 
 import threading
-from typing import Any, Callable, List, Optional, Tuple
+from typing import Any, Callable, List, Optional, Tuple, cast
 
 import smach
 
@@ -164,10 +164,11 @@ class Recovery:
     @property
     def chosen(self) -> Optional[ChosenWay]:
         """Return the way that it has decided for, None where no streak is to know of it."""
-        choice, situation = self.choice, self.situation
-        if choice is None or situation is None:
+        choice = self.choice
+        if choice is None:
             return None
-        way, place = choice.ways[0], LATER if situation.menu.streak.tried else FIRST
+        tried = cast(Situation, self.situation).menu.streak.tried
+        way, place = choice.ways[0], LATER if tried else FIRST
         return self._gone(way.key, way.kind, place, choice.hoped)
 
     def asked_for(self, path: JumpPath) -> Optional[ChosenWay]:
