@@ -126,3 +126,20 @@ def test_what_cannot_be_entered_now_is_not_recommended(clock):
     released.set()
     told = choices(expert.questions[-1])['B']
     assert told.blocked and (told.helped, told.tried, told.recommended) == (2, 2, '')
+
+
+def test_a_choice_has_the_minutes_of_the_way_that_leads_there(clock):
+    def takes(outcome):
+        return lambda state, ud: clock.advance(30.0) or outcome
+
+    expert = FakeExpert(supersede('ok'))
+    machine = watched(
+        Scripted(takes('ok')),
+        Scripted(takes('aborted')),
+        Scripted(),
+        settings={'policy': 'escalating', 'max_recoveries': 0},
+        expert=expert,
+    )
+    assert machine.run() == 'done'
+    told = {label: each.minutes for label, each in choices(expert.questions[0]).items()}
+    assert told == {'B': 0.5, 'A': 1.0, 'C': 0.0}

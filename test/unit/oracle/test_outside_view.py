@@ -4,8 +4,9 @@ import copy
 
 import pytest
 from forked import in_a_fork
+from guarded_machines import chain
 from held_machines import Gate, Held
-from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
+from machines import FakeExpert, Scripted, Watched, chain_of, give_up, goto, supersede, watched
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -268,3 +269,29 @@ def test_nothing_that_is_under_way_travels_with_a_copy(copied):
     assert copied(scope).reason is None
     clock = PausableClock(Clock())
     assert type(copied(clock)) is PausableClock and copied(clock).now() > 0.0
+
+
+@pytest.mark.parametrize(
+    'fails, answer, returned',
+    [
+        ('aborted', goto('B'), 'B'),
+        ('aborted', supersede('ok'), 'ok'),
+        ('aborted', give_up('preempted'), 'preempted'),
+        ('aborted', goto('A', container='SM_ROOT'), ''),  # the container is left
+        (ValueError('slipped'), give_up(), ''),  # it raises
+    ],
+)
+def test_the_meta_state_ends_with_what_the_machine_goes_by(fails, answer, returned):
+    inner = chain(B=Scripted(fails, 'ok'))
+    settings = {'policy': 'always_ask', 'author_recoveries': 'override'}
+    machine = Watched(
+        chain(A=Scripted(), IN=inner), expert=FakeExpert(answer, goto('A')), settings=settings
+    )
+    meta = inner.get_children()['ORACLE']
+    execute, ends = meta.execute, []
+    meta.execute = lambda ud: ends.append(execute(ud)) or ends[-1]
+    try:
+        machine.run()
+    except smach.InvalidUserCodeError:
+        assert isinstance(fails, ValueError)
+    assert ends == [returned]

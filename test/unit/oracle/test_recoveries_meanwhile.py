@@ -11,6 +11,7 @@ from machines import (
     Watched,
     give_up,
     in_thread,
+    waits,
 )
 
 from smach_oracle.oracle import oracle_of
@@ -109,6 +110,22 @@ def test_a_preempt_ends_a_precondition_of_the_level_above():
     assert gate.entered.wait(20)
     machine.machine.request_preempt()
     assert run.result() == 'preempted'
+
+
+def test_a_preempt_while_a_person_is_asked_reaches_no_precondition_that_has_ended():
+    clear = Scripted('aborted')
+
+    def ask(question, cancelled, progress):
+        machine.machine.request_preempt()
+        return waits(question, cancelled, progress)
+
+    machine = Watched(
+        chain(A=Scripted('aborted')),
+        expert=FakeExpert(ask),
+        settings={'memory': 1000, 'prior': 0.5, 'states': {'A': {'preconditions': [clear]}}},
+    )
+    assert machine.run() == 'preempted'
+    assert clear.runs == 1 and not clear.preempt_requested()
 
 
 def test_what_a_preempt_comes_for_at_the_end_of_a_wait_to_be_well_is_not_entered_again():

@@ -5,7 +5,7 @@ from guarded_machines import chain
 from machines import FakeExpert, Scripted, Watched, supersede
 
 import smach
-from smach_oracle.oracle.decision.policy import Action, Policy
+from smach_oracle.oracle.decision.policy import Action, Policy, Preconditions
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.visits import VisitResult
 
@@ -196,3 +196,25 @@ def test_no_state_of_an_earlier_execution_of_the_container_is_stepped_back_to():
     machine = Watched(top, settings={'policy': 'algorithm1'})
     assert machine.run() == 'done'
     assert machine.visits() == ['N', 'A', 'B', 'C', 'MORE', 'N', 'A', 'A', 'B', 'C', 'MORE']
+
+
+def test_a_policy_is_told_how_the_preconditions_stand():
+    """Of a state that has none, one that has not met its own, and one that has."""
+    seen = []
+
+    class Sees(Elsewhere):
+        def decide(self, situation):
+            seen.append(situation.preconditions)
+            return Action.REVISIT
+
+        def runs_preconditions(self, failure_class):
+            return True
+
+    preconditions = {'B': [lambda ud: False], 'C': [lambda ud: True]}
+    machine = Watched(
+        chain(A=Scripted('aborted'), B=Scripted('aborted'), C=Scripted('aborted')),
+        preconditions=preconditions,
+    )
+    machine.machine._oracle.in_force.policy = Sees('A')
+    assert machine.run() == 'done'
+    assert seen == [Preconditions.NONE, Preconditions.NOT_MET, Preconditions.MET]

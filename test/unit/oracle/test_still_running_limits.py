@@ -4,7 +4,7 @@ import threading
 
 import pytest
 from guarded_machines import chain, guarded
-from machines import FakeExpert, FakeHealth, Gate, Scripted, goto, in_thread, supersede
+from machines import FakeExpert, FakeHealth, Gate, Scripted, Watched, goto, in_thread, supersede
 from test_still_running import asked, told
 from waiting import wait_for
 
@@ -265,3 +265,24 @@ def test_where_the_minutes_are_over_nobody_is_asked_about_a_place_that_has_close
     assert machine.run() == 'aborted'
     (ending,) = machine.of(EventKind.GIVE_UP)
     assert ending.text.endswith(': the machine ends as without an oracle')
+
+
+def test_the_time_of_a_question_inside_is_no_time_of_the_state(clock):
+    def ask(question, cancelled, progress):
+        clock.advance(100.0)
+        return goto('A')
+
+    def stays(state, ud):
+        clock.advance(1.0)
+        assert not threading.Event().wait(0.3)
+        return 'ok'
+
+    inner = chain(A=Scripted('aborted', 'aborted', stays))
+    expert = FakeExpert(goto('X'), ask)
+    machine = Watched(
+        chain(X=inner),
+        expert=expert,
+        settings={'still_running_s': 60.0, 'still_running_factor': 1, 'max_recoveries': 0},
+    )
+    assert machine.run() == 'done'
+    assert [question.failed_state for question in expert.questions] == ['A', 'A']

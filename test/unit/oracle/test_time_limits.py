@@ -363,3 +363,24 @@ def test_a_preempt_request_that_cannot_be_taken_back_is_told(log):
     ((level, text),) = log
     assert level == 'warn' and text.startswith('Could not take a preempt request back from')
     assert 'mine' in text
+
+
+@pytest.mark.parametrize(
+    'outcomes, ends',
+    [
+        (['abort', 'done', 'failed', 'error'], 'failed'),
+        (['abort', 'done', 'fail'], 'abort'),
+        (['done', 'lost'], 'lost'),
+    ],
+)
+def test_where_nobody_is_asked_an_overrun_ends_the_machine_as_badly_as_it_can(
+    outcomes, ends, clock
+):
+    gate = Gate()
+    clock.end(1, gate.entered)
+    machine = watched(
+        Scripted(gate, outcomes=('ok',)),
+        outcomes=outcomes,
+        settings={'policy': 'always_ask', **LIMITED},
+    )
+    assert machine.run() == ends

@@ -2,6 +2,7 @@
 
 import pytest
 from machines import FakeExpert, FakeWaiting, Scripted, Watched, goto, supersede, watched
+from reporting_machines import BAD, made
 
 import smach
 from smach_oracle.oracle import oracle_of
@@ -141,6 +142,48 @@ def test_the_states_of_the_containers_around_are_on_the_menu():
     menu = menu_at(machine)
     assert [key for key in menu if isinstance(key, str)] == ['LOOK', '/HOME']
     assert list(menu['/HOME']['repeats']) == ['LOOK', '/HOME']
+
+
+def taken_away(machine, label):
+    for table in (machine._states, machine._transitions):
+        del table[label]
+
+
+@pytest.mark.parametrize('gone', ['', 'OPEN'])
+def test_of_a_machine_on_the_way_the_states_that_were_visited_in_it_count(gone):
+    def fail(state, ud):
+        if gone:
+            taken_away(arm, gone)
+        return 'aborted'
+
+    arm = smach.StateMachine(outcomes=ENDS)
+    with arm:
+        smach.StateMachine.add('OPEN', Scripted(), {'ok': 'CLOSE'})
+        smach.StateMachine.add('CLOSE', Scripted(), {'ok': 'done'})
+        smach.StateMachine.add('STOW', Scripted(), {'ok': 'done'})
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('ARM', arm, {'done': 'PICK'})
+        smach.StateMachine.add('PICK', Scripted(fail), {'ok': 'done'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    repeated = ['ARM/CLOSE'] if gone else ['ARM/OPEN', 'ARM/CLOSE']
+    assert list(menu_at(machine)['ARM']['repeats']) == repeated
+
+
+def test_the_visits_after_a_failure_that_is_reported_are_those_of_its_own_container():
+    work = made(
+        [
+            ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'TELL'}),
+            ('TELL', Scripted(outcomes=('said',)), {'said': 'failed'}),
+        ]
+    )
+    top = made(
+        [('LOOK', Scripted(outcomes=('ok',)), {'ok': 'ARM'}), ('ARM', work, {'done': 'done'})]
+    )
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    assert [key for key in menu_at(machine) if isinstance(key, str)] == ['/LOOK']
 
 
 def test_a_streak_goes_on_where_its_own_way_has_left_the_container():
@@ -406,16 +449,11 @@ def test_a_state_that_may_end_the_loop_is_on_no_menu_of_a_later_round():
     }
 
 
-def taken_away(machine, label):
-    for table in (machine.machine._states, machine.machine._transitions):
-        del table[label]
-
-
 def test_what_leads_to_a_state_that_is_gone_does_not_end_the_loop():
     """NEXT, PICK, and again from NEXT, which leads to ASIDE, too, until PICK fails."""
 
     def fail(state, ud):
-        taken_away(machine, 'ASIDE')
+        taken_away(top, 'ASIDE')
         return 'aborted'
 
     top = smach.StateMachine(outcomes=ENDS)
@@ -437,7 +475,7 @@ def test_what_leads_to_a_state_that_is_gone_does_not_end_the_loop():
 
 def test_a_state_that_is_gone_is_on_no_menu_and_not_entered_on_the_way():
     def fail(state, ud):
-        taken_away(machine, 'B')
+        taken_away(machine.machine, 'B')
         return 'aborted'
 
     machine = failing(3, fails=['aborted', fail], expert=FakeExpert())

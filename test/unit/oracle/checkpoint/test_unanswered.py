@@ -227,6 +227,7 @@ def test_in_a_concurrence_the_branch_that_was_answered_stops_as_well(tmp_path):
     told = killed.run(expert=Answers(tmp_path / 'asked', give))
     assert (told['outcome'], told['ended_by']) == (None, 'kept')
     assert killed.diary.count('begins') == {'LEFT': 2, 'RIGHT': 1}
+    assert not killed.diary.count('ends'), 'it is preempted, and does not run to its end'
     told = killed.run(on_resume='recover')
     assert told['outcome'] == 'succeeded'
     assert killed.diary.count('begins') == {'LEFT': 3, 'RIGHT': 2, 'C': 1}
