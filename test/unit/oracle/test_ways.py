@@ -144,33 +144,6 @@ def test_the_states_of_the_containers_around_are_on_the_menu():
     assert list(menu['/HOME']['repeats']) == ['LOOK', '/HOME']
 
 
-def taken_away(machine, label):
-    for table in (machine._states, machine._transitions):
-        del table[label]
-
-
-@pytest.mark.parametrize('gone', ['', 'OPEN'])
-def test_of_a_machine_on_the_way_the_states_that_were_visited_in_it_count(gone):
-    def fail(state, ud):
-        if gone:
-            taken_away(arm, gone)
-        return 'aborted'
-
-    arm = smach.StateMachine(outcomes=ENDS)
-    with arm:
-        smach.StateMachine.add('OPEN', Scripted(), {'ok': 'CLOSE'})
-        smach.StateMachine.add('CLOSE', Scripted(), {'ok': 'done'})
-        smach.StateMachine.add('STOW', Scripted(), {'ok': 'done'})
-    top = smach.StateMachine(outcomes=ENDS)
-    with top:
-        smach.StateMachine.add('ARM', arm, {'done': 'PICK'})
-        smach.StateMachine.add('PICK', Scripted(fail), {'ok': 'done'})
-    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
-    assert machine.run() == 'done'
-    repeated = ['ARM/CLOSE'] if gone else ['ARM/OPEN', 'ARM/CLOSE']
-    assert list(menu_at(machine)['ARM']['repeats']) == repeated
-
-
 def test_the_visits_after_a_failure_that_is_reported_are_those_of_its_own_container():
     work = made(
         [
@@ -447,42 +420,6 @@ def test_a_state_that_may_end_the_loop_is_on_no_menu_of_a_later_round():
         'PICK',
         'LOOK',
     }
-
-
-def test_what_leads_to_a_state_that_is_gone_does_not_end_the_loop():
-    """NEXT, PICK, and again from NEXT, which leads to ASIDE, too, until PICK fails."""
-
-    def fail(state, ud):
-        taken_away(top, 'ASIDE')
-        return 'aborted'
-
-    top = smach.StateMachine(outcomes=ENDS)
-    with top:
-        smach.StateMachine.add(
-            'NEXT', Scripted(outcomes=('ok', 'aside', 'aborted')), {'ok': 'PICK', 'aside': 'ASIDE'}
-        )
-        smach.StateMachine.add('PICK', Scripted('ok', fail, 'ok', 'ok'), {'ok': 'MORE'})
-        more = Scripted('more', outcomes=('ok', 'more', 'aborted'))
-        smach.StateMachine.add('MORE', more, {'more': 'NEXT', 'ok': 'done'})
-        smach.StateMachine.add('ASIDE', Scripted(), {'ok': 'MORE'})
-    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
-    assert machine.run() == 'done'
-    assert {way['target'] for way in machine.of(EventKind.DECISION)[0].data['menu']} == {
-        'PICK',
-        'NEXT',
-    }
-
-
-def test_a_state_that_is_gone_is_on_no_menu_and_not_entered_on_the_way():
-    def fail(state, ud):
-        taken_away(machine.machine, 'B')
-        return 'aborted'
-
-    machine = failing(3, fails=['aborted', fail], expert=FakeExpert())
-    assert machine.run() == 'done'
-    assert [key for key in menu_at(machine, 0) if isinstance(key, str)] == ['B', 'A']
-    assert [key for key in menu_at(machine, 1) if isinstance(key, str)] == ['A']
-    assert list(menu_at(machine, 1)['A']['repeats']) == ['A']
 
 
 def test_a_list_that_was_appended_to_in_place_is_restored_only_if_it_is_copied():

@@ -1,0 +1,71 @@
+"""The menu of a failure where states of the machine were taken away meanwhile."""
+
+import pytest
+from machines import FakeExpert, Scripted, Watched
+from test_ways import ENDS, at_once, failing, menu_at
+
+import smach
+from smach_oracle.oracle.records.events import EventKind
+
+
+def taken_away(machine, label):
+    for table in (machine._states, machine._transitions):
+        del table[label]
+
+
+@pytest.mark.parametrize('gone', ['', 'OPEN'])
+def test_of_a_machine_on_the_way_the_states_that_were_visited_in_it_count(gone):
+    def fail(state, ud):
+        if gone:
+            taken_away(arm, gone)
+        return 'aborted'
+
+    arm = smach.StateMachine(outcomes=ENDS)
+    with arm:
+        smach.StateMachine.add('OPEN', Scripted(), {'ok': 'CLOSE'})
+        smach.StateMachine.add('CLOSE', Scripted(), {'ok': 'done'})
+        smach.StateMachine.add('STOW', Scripted(), {'ok': 'done'})
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add('ARM', arm, {'done': 'PICK'})
+        smach.StateMachine.add('PICK', Scripted(fail), {'ok': 'done'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    repeated = ['ARM/CLOSE'] if gone else ['ARM/OPEN', 'ARM/CLOSE']
+    assert list(menu_at(machine)['ARM']['repeats']) == repeated
+
+
+def test_what_leads_to_a_state_that_is_gone_does_not_end_the_loop():
+    """NEXT, PICK, and again from NEXT, which leads to ASIDE, too, until PICK fails."""
+
+    def fail(state, ud):
+        taken_away(top, 'ASIDE')
+        return 'aborted'
+
+    top = smach.StateMachine(outcomes=ENDS)
+    with top:
+        smach.StateMachine.add(
+            'NEXT', Scripted(outcomes=('ok', 'aside', 'aborted')), {'ok': 'PICK', 'aside': 'ASIDE'}
+        )
+        smach.StateMachine.add('PICK', Scripted('ok', fail, 'ok', 'ok'), {'ok': 'MORE'})
+        more = Scripted('more', outcomes=('ok', 'more', 'aborted'))
+        smach.StateMachine.add('MORE', more, {'more': 'NEXT', 'ok': 'done'})
+        smach.StateMachine.add('ASIDE', Scripted(), {'ok': 'MORE'})
+    machine = at_once(Watched(top, settings={'policy': 'escalating'}))
+    assert machine.run() == 'done'
+    assert {way['target'] for way in machine.of(EventKind.DECISION)[0].data['menu']} == {
+        'PICK',
+        'NEXT',
+    }
+
+
+def test_a_state_that_is_gone_is_on_no_menu_and_not_entered_on_the_way():
+    def fail(state, ud):
+        taken_away(machine.machine, 'B')
+        return 'aborted'
+
+    machine = failing(3, fails=['aborted', fail], expert=FakeExpert())
+    assert machine.run() == 'done'
+    assert [key for key in menu_at(machine, 0) if isinstance(key, str)] == ['B', 'A']
+    assert [key for key in menu_at(machine, 1) if isinstance(key, str)] == ['A']
+    assert list(menu_at(machine, 1)['A']['repeats']) == ['A']
