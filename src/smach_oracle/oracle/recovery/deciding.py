@@ -228,7 +228,7 @@ def _run_precondition(recovery: Recovery, spec: PreconditionSpec) -> bool:
     name = spec.name
     recovery.tell(EventKind.PRECONDITION_START, target=name)
     why_not = why_not_met(recovery, spec)
-    for _ in range(recovery.record.most_repeats if why_not else 0):
+    for _ in range(recovery.record.most_repeats):
         waits = recovery.origin.has_waited_after
         if not why_not or not waits('did not get its precondition ' + name):
             break

@@ -350,7 +350,6 @@ class OracleState(smach.State):
         with self._lock:
             self._preempt_requested = False
             self._recovery = recovery
-            self._verdict = None
 
     def execute(self, ud: smach.UserData) -> str:
         """Recover from the failure handed to `begin`.
