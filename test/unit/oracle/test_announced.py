@@ -31,6 +31,20 @@ def test_whatever_the_reporting_state_says(says):
     assert machine.rate('REPORT').failures == 0
 
 
+def test_an_outcome_that_is_listed_as_a_failure_reports_no_other():
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        Scripted(outcomes=('said',)),
+        settings={'states': {'REPORT': {'failure_outcomes': ['said']}}},
+    )
+    assert machine.run() == 'done'
+    assert told(machine, EventKind.FAILURE, EventKind.DECISION)[:3] == [
+        ('FAILURE', 'WORK'),
+        ('FAILURE', 'REPORT'),
+        ('DECISION', 'REPORT'),
+    ]
+
+
 def test_the_state_that_reports_it_may_come_later():
     between = [
         ('STOW', Scripted(outcomes=('stowed',)), {'stowed': 'CALL'}),

@@ -7,7 +7,7 @@ from machines import FakeExpert, Scripted, goto, watched
 from smach_oracle.oracle.records.events import EventKind
 
 
-def asked(preconditions, **settings):
+def asked(preconditions, strict=True, **settings):
     """The machine after a question about B, and the question; what its preconditions say is asked
     while it is open.
     """
@@ -28,6 +28,7 @@ def asked(preconditions, **settings):
         Scripted(),
         expert=Looking(goto('C')),
         preconditions=preconditions,
+        strict=strict,
         settings=dict({'max_recoveries': 0}, **settings),
     )
     machine.machine.userdata.cup = 'mug'
@@ -111,3 +112,8 @@ def test_it_can_be_switched_off():
 
 def test_a_question_without_preconditions_has_nothing_to_look_at():
     assert asked({})[1] == []
+
+
+def test_of_a_state_that_is_not_there_only_its_name_is_told():
+    _, found = asked({'B': ['NOWHERE']}, strict=False)
+    assert found == [(('B', 'NOWHERE'), None, 'only running NOWHERE would tell')]

@@ -110,6 +110,7 @@ def test_a_preempt_ends_a_precondition_of_the_level_above():
     assert gate.entered.wait(20)
     machine.machine.request_preempt()
     assert run.result() == 'preempted'
+    assert machine.rate('ARM').failures == 0, 'its level has not decided'
 
 
 def test_a_preempt_while_a_person_is_asked_reaches_no_precondition_that_has_ended():
@@ -166,3 +167,39 @@ def test_the_minutes_may_be_over_before_the_robot_is_well_enough_for_a_precondit
     )
     assert machine.run() == 'aborted'
     assert look.runs == 1
+
+
+def test_a_question_says_how_the_preconditions_have_ended():
+    def holds(ud):
+        return True
+
+    def fails(ud):
+        return False
+
+    expert = FakeExpert(give_up('aborted'))
+    machine = Watched(
+        chain(A=Scripted('aborted')),
+        expert=expert,
+        settings={
+            'memory': 1000,
+            'prior': 0.5,
+            'states': {'A': {'preconditions': [holds, fails]}},
+        },
+    )
+    assert machine.run() == 'aborted'
+    assert expert.questions[0].tried == (
+        'precondition holds: met',
+        'precondition fails: not met (fails returned False)',
+    )
+
+
+def test_while_the_robot_is_well_a_precondition_that_is_not_met_is_asked_about_once():
+    """A look at what A has failed by, one at what the precondition has, and one before the jump."""
+    health = FakeHealth()
+    machine = Watched(
+        chain(LOOK=Scripted(), A=Scripted('aborted')),
+        health=health,
+        settings={'health_settle_s': 0, 'states': {'A': {'preconditions': [lambda ud: False]}}},
+    )
+    assert machine.run() == 'done'
+    assert health.asked == 3

@@ -1,7 +1,8 @@
 """The menu of a failure where states of the machine were taken away meanwhile."""
 
 import pytest
-from machines import FakeExpert, Scripted, Watched
+from machines import FakeExpert, Scripted, Watched, goto
+from reporting_machines import BAD, reporting
 from test_ways import ENDS, at_once, failing, menu_at
 
 import smach
@@ -69,3 +70,29 @@ def test_a_state_that_is_gone_is_on_no_menu_and_not_entered_on_the_way():
     assert [key for key in menu_at(machine, 0) if isinstance(key, str)] == ['B', 'A']
     assert [key for key in menu_at(machine, 1) if isinstance(key, str)] == ['A']
     assert list(menu_at(machine, 1)['A']['repeats']) == ['A']
+
+
+def test_a_failure_is_reported_though_a_state_in_between_is_gone():
+    expert = FakeExpert(goto('CALL'), goto('WORK'))
+
+    def tells(state, ud):
+        taken_away(machine.machine, 'CALL')
+        return 'said'
+
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        Scripted(tells, outcomes=('said',)),
+        between=[
+            (
+                'STOW',
+                Scripted('aborted', outcomes=('stowed', 'aborted')),
+                {'stowed': 'REPORT', 'aborted': 'failed'},
+            ),
+            ('CALL', Scripted(outcomes=('called',)), {'called': 'REPORT'}),
+        ],
+        expert=expert,
+        settings={'max_recoveries': 0},
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['LOOK', 'WORK', 'STOW', 'CALL', 'REPORT', 'WORK']
+    assert [question.failed_state for question in expert.questions] == ['STOW', 'WORK']

@@ -3,8 +3,8 @@
 import threading
 
 import pytest
-from machines import FakeExpert, Gate, Scripted, chain_of, goto, supersede
-from test_still_running import asked, failures, letting_go
+from machines import FakeExpert, Gate, Scripted, chain_of, goto, supersede, watched
+from test_still_running import SOON, asked, failures, letting_go
 
 from smach_oracle.oracle.records.events import EventKind
 
@@ -67,3 +67,17 @@ def test_an_answer_before_a_preempt_is_not_said_to_be_of_no_use():
     )
     assert machine.run() == 'preempted'
     assert not machine.of(EventKind.WARNING)
+
+
+def test_to_wait_on_repeats_nothing_and_to_go_elsewhere_does():
+    gate = Gate()
+    expert = FakeExpert(goto('B'), letting_go(gate, None))
+    machine = watched(
+        Scripted(),
+        Scripted('aborted', gate),
+        expert=expert,
+        settings={**SOON, 'max_recoveries': 0, 'on_retry': 'confirm'},
+    )
+    assert machine.run() == 'done'
+    told = {each.state: each.repeats for each in expert.questions[1].choices}
+    assert told == {'A': ('A', 'B'), 'B': ()}

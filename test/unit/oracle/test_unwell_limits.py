@@ -128,3 +128,8 @@ def test_a_precondition_that_makes_the_robot_unwell_is_not_run_without_end(healt
     heals_at_once(machine, health)
     machine.run()
     assert len(runs) == 3
+
+
+def test_the_log_says_of_what_kind_a_failure_is_that_is_not_counted(health, log):
+    assert flapping(health, times=1).run() == 'done'
+    assert ('info', 'SM_ROOT/A failed, which is not counted: aborted') in log
