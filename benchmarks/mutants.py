@@ -31,7 +31,7 @@ from typing import Dict, List, NamedTuple, Sequence, Set
 ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT / 'test/unit/support'), str(ROOT / 'test/harness')]
 
-from mutating.copies import TestsNotRun
+from mutating.collected import TestsNotRun
 from mutating.mutations import Mutant
 from mutating.trying import Project, Reach, Trial, Workshop
 

@@ -137,6 +137,8 @@ def test_the_exit_status_says_whether_enough_were_killed(killed, survived, statu
 MODULE = """
 import os, subprocess, sys
 
+ON_IMPORT = 11
+
 def at_least(a, b):
     return a >= b
 
@@ -170,6 +172,14 @@ def shared():
 def waits(event):
     while not event.is_set():
         event.wait(0.01)
+
+class Above:
+    def __init__(self):
+        self.made = True
+
+class Below(Above):
+    def __init__(self):
+        super().__init__()
 """
 TEST = """
 import m, pytest, threading
@@ -195,6 +205,12 @@ def test_begins(made_once):
 
 def test_shared(made_once):
     assert made_once == 7
+
+def test_on_import():
+    assert m.ON_IMPORT == 11
+
+def test_below():
+    assert m.Below().made
 
 def test_waits():
     event = threading.Event()
@@ -232,6 +248,8 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
         'a * 2': {'(a / 2)': 'killed'},  # a child of the test reaches it
         '5': {'(5 + 1)': 'killed'},  # so does one that it forks
         '7': {'(7 + 1)': 'killed'},  # the second test sees what is made for the first one, too
+        '11': {'(11 + 1)': 'killed'},  # it was taken as the module was imported
+        'super().__init__()': {'pass': 'killed'},  # the function is another closure without it
         'len(found) < to': {'len(found) >= to': 'killed'},
         'found.append(bytes(1 << 22))': {'pass': 'hung'},
         'not event.is_set()': {'(event.is_set())': 'hung'},

@@ -2,19 +2,23 @@
 
 import collections
 import json
+import math
 import os
 import re
 import shutil
 import sys
 import time
 from pathlib import Path
-from typing import DefaultDict, Dict, List, NamedTuple, Sequence, Set, Tuple
+from typing import DefaultDict, Dict, List, NamedTuple, Optional, Sequence, Set, Tuple
 
 from processes import Runner
+
+from .collected import Collected, Ending, TestsNotRun
 
 LEFT_OUT = shutil.ignore_patterns('build', '.venv', '.git', '__pycache__')
 PYTEST = ('-m', 'pytest', '-q', '-x', '-p', 'no:cacheprovider')
 LOG = 'pytest.log'
+MEASURING_S = 600.0
 # a mutant may collect without end. No test needs as much
 MEMORY = ('prlimit', '--as={}'.format(4 << 30))
 TOO_LATE = 'not done after'  # a word of `Runner`
@@ -38,6 +42,7 @@ if measured is not None:
 # a plugin for pytest: says to which test a line belongs, and how long each takes. What a file makes
 # once for its tests belongs to none of them
 BY_TEST = """import json
+import math
 import os
 import time
 
@@ -75,18 +80,6 @@ def pytest_sessionfinish():
 Line = Tuple[str, int]  # module, number
 
 
-class TestsNotRun(Exception):
-    """pytest could not run the tests. The text has its output."""
-
-
-class Ending(NamedTuple):
-    """How a run of tests has ended."""
-
-    is_fine: bool
-    is_hung: bool
-    took_s: float
-
-
 class Reach(NamedTuple):
     """A test, or a file of tests: the lines that it reaches, and how long it takes."""
 
@@ -103,11 +96,15 @@ class Reach(NamedTuple):
 class Copy:
     """A copy of a tree."""
 
-    def __init__(self, root: Path, folder: Path, runner: Runner) -> None:
-        """:param folder: where it is made. What is measured lies next to it."""
+    def __init__(self, root: Path, folder: Path, runner: Runner, tests: str) -> None:
+        """:param folder: where it is made. What is measured lies next to it.
+        :param tests: folder in it that has the tests.
+        """
         self.folder = folder
         self._runner = runner
-        self._measured = folder.with_name(folder.name + '.measured')
+        self._tests = tests
+        self._measured = self._beside('measured')
+        self._collected: Optional[Collected] = None
         shutil.copytree(str(root), str(folder), ignore=LEFT_OUT)
 
     def run(self, tests: Sequence[str], limit_s: float, env: Dict[str, str]) -> Ending:
@@ -116,27 +113,61 @@ class Copy:
         :raises TestsNotRun: where pytest finds none, or is not installed.
         :raises KeyboardInterrupt: where the runner was stopped.
         """
-        path = os.pathsep.join(
-            filter(
-                None,
-                (env.get('PYTHONPATH'), str(self.folder / 'src'), os.environ.get('PYTHONPATH')),
-            )
-        )
         begun_s = time.monotonic()
-        problem = self._runner.run(
-            [*MEMORY, sys.executable, *PYTEST, *tests],
-            self.folder / LOG,
-            limit_s,
-            self.folder,
-            dict(env, PYTHONPATH=path, PYTHONDONTWRITEBYTECODE='1', PYTHONHASHSEED='0'),
-        ).problem
+        problem = self._pytest(tests, self.folder / LOG, limit_s, env)
         if problem == 'interrupted':
             raise KeyboardInterrupt
         if problem in NOT_RUN:
             raise TestsNotRun(self.last_words())
-        return Ending(not problem, problem.startswith(TOO_LATE), time.monotonic() - begun_s)
+        return Ending(
+            not problem,
+            problem.startswith(TOO_LATE),
+            time.monotonic() - begun_s,
+            self._first_failed() if problem else '',
+        )
 
-    def measure(self, file: str, below: str, limit_s: float) -> Tuple[Ending, List[Reach]]:
+    def _pytest(
+        self, arguments: Sequence[str], log: Path, limit_s: float, env: Dict[str, str]
+    ) -> str:
+        """Run pytest, and return what went wrong."""
+        paths = (env.get('PYTHONPATH'), str(self.folder / 'src'), os.environ.get('PYTHONPATH'))
+        path = os.pathsep.join(filter(None, paths))
+        return self._runner.run(
+            [*MEMORY, sys.executable, *PYTEST, *arguments],
+            log,
+            limit_s,
+            self.folder,
+            dict(env, PYTHONPATH=path, PYTHONDONTWRITEBYTECODE='1', PYTHONHASHSEED='0'),
+        ).problem
+
+    def run_changed(self, module: Path, tests: Sequence[str], limit_s: float) -> Ending:
+        """Run tests with the change of a module that is on the disk, as `run` does, and quickly
+        where the change is within functions.
+        """
+        if self._collected is None:
+            self._collected = Collected(self._collect, self._beside('asked'))
+        ending = self._collected.run(module, tests, limit_s)
+        if ending is not None:
+            return ending
+        try:
+            return self.run(tests, limit_s, {})
+        except TestsNotRun:  # the module does not load, or its tests have other names
+            files = sorted({test.split('::')[0] for test in tests})
+            return self.run(files, MEASURING_S, {})
+
+    def _collect(self, env: Dict[str, str]) -> str:
+        """Hold the tests for `_collected`. Return what went wrong in the end."""
+        log = self.folder / 'collected.log'
+        problem = self._pytest([self._tests], log, math.inf, env)
+        return '{}\n{}'.format(problem, _end_of(log))
+
+    def close(self) -> None:
+        """End what it has started."""
+        if self._collected is not None:
+            self._collected.close()
+            self._collected = None
+
+    def measure(self, file: str, below: str) -> Tuple[Ending, List[Reach]]:
         """Run a file of tests, and return which lines of which modules each test reaches. Lines
         that a child process reaches, and what the tests share, are those of the file as a whole.
 
@@ -154,7 +185,7 @@ class Copy:
         (self._measured / 'by_test.py').write_text(BY_TEST)
         ending = self.run(
             ['-p', 'by_test', file],
-            limit_s,
+            MEASURING_S,
             {
                 'COVERAGE_PROCESS_START': str(settings),
                 'TIMES_OF_TESTS': str(times),
@@ -188,18 +219,25 @@ class Copy:
                         found[test].add((name, number))
         return found
 
+    def _beside(self, name: str) -> Path:
+        return self.folder.with_name('{}.{}'.format(self.folder.name, name))
+
     def last_words(self) -> str:
         """Return the end of the output of the latest run."""
-        return (self.folder / LOG).read_text(errors='replace')[-2000:]
+        return _end_of(self.folder / LOG)
 
-    def first_failed(self) -> str:
+    def _first_failed(self) -> str:
         """Return the name of the test that failed in the latest run, or '' where none is named."""
         found = FAILED.search((self.folder / LOG).read_text(errors='replace'))
         return found.group(1) if found else ''
 
-    def files_of_tests(self, below: str) -> List[str]:
-        """Return the files of tests below a folder."""
+    def files_of_tests(self) -> List[str]:
+        """Return the files of tests."""
         return [
             str(path.relative_to(self.folder))
-            for path in sorted((self.folder / below).rglob('test_*.py'))
+            for path in sorted((self.folder / self._tests).rglob('test_*.py'))
         ]
+
+
+def _end_of(log: Path) -> str:
+    return log.read_text(errors='replace')[-2000:]

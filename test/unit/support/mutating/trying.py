@@ -18,11 +18,11 @@ from typing import (
 
 from processes import Runner
 
-from .copies import Copy, Reach, TestsNotRun
+from .collected import TestsNotRun
+from .copies import Copy, Reach
 from .mutations import Mutant, mutants_of
 
 ATTEMPTS = 3  # of tests that should pass, on a machine that does other work, too
-MEASURING_S = 600.0
 SPARE_S, SLOWER = 60.0, 4.0  # tests that take longer than this hang
 FEW = 25  # tests of the first run. Each further run has as many times more
 
@@ -72,9 +72,9 @@ class Workshop:
         self._jobs = jobs
         self._copies: 'queue.Queue[Copy]' = queue.Queue()
         for number in range(jobs):
-            copy = Copy(project.root, folder / str(number), self._runner)
+            copy = Copy(project.root, folder / str(number), self._runner, project.tests)
             self._copies.put(copy)
-            self._tests = copy.files_of_tests(project.tests)
+            self._tests = copy.files_of_tests()
 
     def look(self) -> Generator[List[Reach], None, None]:
         """Yield which lines the tests of each file reach.
@@ -87,7 +87,13 @@ class Workshop:
         self, mutants: Sequence[Mutant], reaches: List[Reach]
     ) -> Generator[Trial, None, None]:
         """Try each mutant, and yield what has become of it."""
-        return self._each(lambda copy, mutant: _try(copy, self._mutated, mutant, reaches), mutants)
+        try:
+            yield from self._each(
+                lambda copy, mutant: _try(copy, self._mutated, mutant, reaches), mutants
+            )
+        finally:
+            for copy in list(self._copies.queue):
+                copy.close()
 
     def _each(
         self, work: Callable[[Copy, Item], Found], items: Sequence[Item]
@@ -113,7 +119,7 @@ class Workshop:
 
 def _measure(copy: Copy, file: str, below: str) -> List[Reach]:
     for _ in range(ATTEMPTS):
-        ending, reaches = copy.measure(file, below, MEASURING_S)
+        ending, reaches = copy.measure(file, below)
         if ending.is_fine:
             return reaches
     raise TestsNotRun('{} fails without a mutant:\n{}'.format(file, copy.last_words()))
@@ -130,12 +136,11 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
     try:
         for run in _in_runs(tests):
             path.write_text(mutant.applied(original), 'utf-8')
-            verdict, run_s = _verdict_of(copy, run)
+            verdict, by, run_s = _verdict_of(copy, path, run)
             took_s += run_s
-            by = copy.first_failed()
             path.write_text(original, 'utf-8')
             # tests that were never together before may disturb each other
-            if verdict and not _verdict_of(copy, run)[0]:
+            if verdict and not _verdict_of(copy, path, run)[0]:
                 return Trial(mutant, verdict, by, len(tests), took_s)
     finally:
         path.write_text(original, 'utf-8')
@@ -157,8 +162,8 @@ def _in_runs(tests: List[Reach]) -> Iterator[List[Reach]]:
         begin, size = begin + size, size * FEW
 
 
-def _verdict_of(copy: Copy, tests: Sequence[Reach]) -> Tuple[str, float]:
-    """Return whether tests kill the mutant that is in, and how long they took.
+def _verdict_of(copy: Copy, module: Path, tests: Sequence[Reach]) -> Tuple[str, str, float]:
+    """Return whether tests kill the mutant that is in, which one did, and how long they took.
 
     What fails once and then passes has failed for another reason.
     """
@@ -166,17 +171,13 @@ def _verdict_of(copy: Copy, tests: Sequence[Reach]) -> Tuple[str, float]:
     named = [each.test for each in tests]
     took_s, failed = 0.0, 0
     for _ in range(ATTEMPTS):
-        try:
-            ending = copy.run(named, limit_s, {})
-        except TestsNotRun:  # a module does not load, or its tests have other names
-            named = sorted({each.file for each in tests})
-            ending = copy.run(named, MEASURING_S, {})
+        ending = copy.run_changed(module, named, limit_s)
         took_s += ending.took_s
         if ending.is_hung:
-            return 'hung', took_s
+            return 'hung', ending.by, took_s
         failed += not ending.is_fine
         if failed == 2:
-            return 'killed', took_s
+            return 'killed', ending.by, took_s
         if ending.is_fine and not failed:
             break
-    return '', took_s
+    return '', '', took_s
