@@ -31,20 +31,16 @@ class Collected:
     """pytest, which has collected tests and forks for each run of some of them."""
 
     def __init__(self, run_pytest: Callable[[Dict[str, str]], str], address: Path) -> None:
-        """:param run_pytest: run it with this environment, and return what it said in the end.
+        """:param run_pytest: run it with the plugin `forking` and this environment, and return what
+            it said in the end.
+        :param address: of a socket, to be made.
 
         :raises TestsNotRun: where it ends before it has collected.
         """
         self._said = ''
 
         def run() -> None:
-            self._said = run_pytest(
-                {
-                    ASKED_BY: str(address),
-                    'PYTHONPATH': str(SUPPORT),
-                    'PYTEST_PLUGINS': 'mutating.forking',
-                }
-            )
+            self._said = run_pytest({ASKED_BY: str(address), 'PYTHONPATH': str(SUPPORT)})
 
         self._thread = threading.Thread(target=run)
         with socket.socket(socket.AF_UNIX) as listening:

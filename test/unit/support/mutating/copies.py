@@ -158,7 +158,7 @@ class Copy:
     def _collect(self, env: Dict[str, str]) -> str:
         """Hold the tests for `_collected`. Return what went wrong in the end."""
         log = self.folder / 'collected.log'
-        problem = self._pytest([self._tests], log, math.inf, env)
+        problem = self._pytest(['-p', 'mutating.forking', self._tests], log, math.inf, env)
         return '{}\n{}'.format(problem, _end_of(log))
 
     def close(self) -> None:

@@ -38,14 +38,14 @@ def pytest_runtestloop(session: pytest.Session) -> bool:
     """Answer until nobody asks any more."""
     with socket.socket(socket.AF_UNIX) as asking:
         asking.connect(os.environ[ASKED_BY])
-        collected = Collected(session)
+        forks = Forks(session)
         with asking.makefile('rw') as lines:
             for line in lines:
-                print(json.dumps(collected.answer(**json.loads(line))), file=lines, flush=True)
+                print(json.dumps(forks.answer(**json.loads(line))), file=lines, flush=True)
     return True
 
 
-class Collected:
+class Forks:
     """The tests, and the functions of the modules as they were imported."""
 
     def __init__(self, session: pytest.Session) -> None:
