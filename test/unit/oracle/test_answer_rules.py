@@ -114,3 +114,8 @@ def test_output_keys_that_come_twice_are_named():
     check_output_keys('LEFT', ['cup', 'pose'], ['cup', 'pose'])
     with pytest.raises(AnswerError, match='^output keys come twice: cup$'):
         check_output_keys('LEFT', ['cup', 'pose', 'cup'], ['cup', 'pose'])
+
+
+def test_where_nothing_is_allowed_the_refusal_says_so():
+    with pytest.raises(AnswerError, match=r'no interface .* for LEFT; allowed: \(none\)$'):
+        check_answer(interface('hand'), CHOICES._replace(interfaces=()))

@@ -51,6 +51,8 @@ def test_a_container_begins_where_it_was_set_to_begin():
     wrapped = OracleContainer.wrap(machine())
     wrapped.set_initial_state(['PICK'])
     assert [each.initial for each in prospects_of(wrapped)] == ['PICK', 'PUT']
+    empty = OracleContainer.wrap(smach.StateMachine(OUTCOMES))
+    assert [each.initial for each in prospects_of(empty)] == ['']
 
 
 def test_outcomes_lead_where_the_author_drew_them():
