@@ -110,6 +110,18 @@ def test_what_comes_to_its_next_state_while_a_stop_is_on_its_way_is_held() -> No
         assert (held.end(), second.runs) == ('preempted', 0)
 
 
+def test_an_operator_has_a_say_in_each_trial() -> None:
+    gate, second = Gate(), Scripted()
+    held = Held(chain_of(Scripted('ok', gate), second))
+    assert held.run() == 'done'
+    with held.begin():
+        eventually(gate.entered.is_set)
+        held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/B')
+        assert second.runs == 1
+
+
 # -- the words of the hand
 
 

@@ -6,7 +6,7 @@ Each machine here has run before, so that all its transitions are known.
 import threading
 
 import pytest
-from machines import Scripted, Watched, chain_of, watched
+from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -143,3 +143,31 @@ def test_a_preempt_that_only_the_class_knows_of_is_passed_on():
     machine = run_before(chain_of(first, last, machine_class=AsksElsewhere))
     first.script = [lambda state, ud: setattr(machine, 'is_asked', True) or 'ok']
     assert machine.execute() == 'preempted'
+
+
+class RunsTwice(smach.StateMachine):
+    """Runs twice in one execution."""
+
+    def execute(self, parent_ud=None):
+        smach.StateMachine.execute(self, parent_ud)
+        return smach.StateMachine.execute(self, parent_ud)
+
+
+def test_the_second_run_of_an_execution_restores_nothing_of_the_first():
+    def count(outcome):
+        return lambda state, ud: setattr(ud, 'n', ud.n + 1) or outcome
+
+    seen = []
+    first = Scripted(count('ok'), count('aborted'), io_keys=['n'])
+    last = Scripted(*[lambda state, ud: seen.append(ud.n) or 'ok'] * 2, input_keys=['n'])
+    machine = chain_of(first, last, machine_class=RunsTwice)
+    asks = {'policy': 'always_ask'}
+    OracleContainer.wrap(machine, settings=asks, expert=FakeExpert(goto('B')))
+    machine.userdata.n = 0
+    assert machine.execute() == 'done' and seen == [1, 2]
+
+
+def test_a_machine_may_have_a_plain_lock():
+    machine = watched(Scripted(), Scripted()).machine
+    machine._state_transitioning_lock = threading.Lock()
+    run_before(machine)
