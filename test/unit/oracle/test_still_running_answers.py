@@ -81,3 +81,14 @@ def test_to_wait_on_repeats_nothing_and_to_go_elsewhere_does():
     assert machine.run() == 'done'
     told = {each.state: each.repeats for each in expert.questions[1].choices}
     assert told == {'A': ('A', 'B'), 'B': ()}
+
+
+def test_a_state_that_heeds_the_preempt_of_an_answer_is_not_said_to_run_on(log):
+    machine = asked(
+        Scripted('aborted', Gate()), Scripted(), expert=FakeExpert(goto('B')), grace_period_s=3.0
+    )
+    assert machine.run() == 'done'
+    for thread in threading.enumerate():
+        if thread.name == 'smach_oracle still running':
+            thread.join(20)
+    assert not any('does not heed' in text for _, text in log)

@@ -220,3 +220,31 @@ def test_a_question_about_a_state_that_still_runs_is_open_again(tmp_path):
     assert task.goes_on()['outcome'] == 'succeeded'
     ids = [each for each, _ in task.questions()]
     assert ids[0] == ids[1]
+
+
+class EndsLater(FailsThenRuns):
+    """It runs on for a moment once the process goes down, while nobody is asked any more."""
+
+    def execute(self, userdata):
+        if not self._diary.count('fails') or self._diary.count('begins'):
+            return super().execute(userdata)
+        self._diary.write('begins', 'WAITS')
+        assert wait_for(lambda: smach.is_shutdown(), 20.0)
+        wait_for(lambda: False, 0.3)
+        return 'aborted'
+
+
+def test_a_state_that_ends_after_its_question_is_in_doubt(tmp_path):
+    def build(diary, points):
+        machine = smach.StateMachine(['succeeded', 'aborted', 'preempted'])
+        machine.userdata.done = []
+        with machine:
+            machine.add('LONG', EndsLater(diary), {'aborted': 'aborted'})
+        return machine
+
+    task = Task(tmp_path, build, max_recoveries=3, still_running_s=0.05, still_running_factor=1)
+    told = task.goes_down()
+    assert (told['outcome'], told['ended_by']) == (None, 'shutdown')
+    assert task.goes_on()['outcome'] == 'succeeded'
+    ids = [each for each, _ in task.questions()]
+    assert ids[0] == ids[1]
