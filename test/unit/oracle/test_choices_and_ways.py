@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from machines import FakeExpert, Gate, Scripted, Watched, supersede
+from machines import FakeExpert, Gate, Scripted, Watched, give_up, supersede, watched
 from test_still_running import SOON, letting_go
 from test_ways import FAILS, at_once, failing
 
@@ -137,3 +137,12 @@ def test_a_state_that_still_runs_has_no_ways_yet():
     (question,) = expert.questions
     assert question.failure_kind is FailureKind.STILL_RUNNING
     assert set(ways_of(question).values()) == {''}
+
+
+def test_a_choice_of_the_failed_state_tells_how_often_it_was_entered_again():
+    expert = FakeExpert(give_up())
+    settings = {'policy': 'escalating', 'max_recoveries': 1}
+    watched(Scripted('aborted', 'aborted'), settings=settings, expert=expert).run()
+    (question,) = expert.questions
+    told = {each.state: (each.tried, each.helped) for each in question.choices}
+    assert told['A'] == (1, 0)

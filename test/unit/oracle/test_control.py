@@ -43,7 +43,9 @@ def test_a_container_that_ends_on_its_way_is_no_more_on_its_way() -> None:
 def test_a_container_that_ends_before_its_way_tells_where_it_was_to_go() -> None:
     control = Control(FakeClock())
     control.ask_jump('TOP', Jump('C'))
+    assert control.is_set
     assert control.leave(OfAMachine(), lambda: 'TOP') == Jump('C')
+    assert not control.is_set
 
 
 def test_what_was_sent_to_another_container_goes_on_there() -> None:

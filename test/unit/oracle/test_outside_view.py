@@ -142,6 +142,16 @@ def test_what_is_nested_in_a_machine_that_is_built_has_an_oracle_as_the_setting_
     assert ('ORACLE' in other.get_children()) is bool(nested)
 
 
+def test_whether_nested_machines_have_oracles_is_said_best_where_one_is_wrapped():
+    inner, machine = chain_of(Scripted()), smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('INNER', inner)
+    OracleContainer.wrap(machine, nested=False, settings={'nested': True})
+    assert type(inner) is smach.StateMachine
+    OracleContainer.wrap(machine, nested=True, settings={'nested': False})
+    assert isinstance(inner, OracleContainer)
+
+
 @pytest.mark.parametrize('strict', [True, False])
 def test_a_machine_that_is_built_may_have_names_in_its_settings_that_no_state_has(strict, log):
     built = OracleContainer(

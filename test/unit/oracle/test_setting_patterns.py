@@ -57,6 +57,13 @@ def test_the_most_exact_name_wins():
     assert Settings.from_dict({}).for_state('ARM', 'PICK').memory == 10
 
 
+def test_a_pattern_of_paths_stands_for_states_of_the_top_machine_too():
+    hand = {'hand': {'action': 'assist', 'states': ['**/PICK']}}
+    settings = Settings.from_dict({'states': {'**/PICK': {'memory': 3}}, 'interfaces': hand})
+    assert settings.for_state('', 'PICK').memory == 3
+    assert [offer.name for offer in settings.offers_for('', 'PICK')] == ['hand']
+
+
 def test_names_add_up_key_by_key():
     settings = Settings.from_dict(
         {
