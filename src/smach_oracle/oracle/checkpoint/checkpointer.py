@@ -168,7 +168,8 @@ class Checkpointer:
                 and not (event.kind is EventKind.SUPERSEDE and _is_on_its_way(node))
             )
             or event.seq >= self._seq_stored + SEQ_RESERVE
-            or node.is_oracle(event.target)
+            # a precondition is told as a target, too, and may have the same name
+            or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
         )
 
     def _pending_of(self, node: TreeNode) -> List[Fact]:

@@ -264,8 +264,9 @@ def _print_of(value: object) -> Optional[bytes]:
 
 def _is_plain(encoded: Encoded) -> bool:
     """Whether a value has no bytes and no arrays: marshal does not tell these apart."""
-    texts = [(encoded.text or '').encode('ascii'), *encoded.parts.values()]
-    return not any(tag in text for text in texts for tag in (b'"$b', b'"$part'))
+    parts, whole = encoded.parts, encoded.whole
+    text = encoded.text or ('' if whole is None else parts[whole].decode('ascii'))
+    return len(parts) == (whole is not None) and '"$b' not in text
 
 
 def keys_of(machine: smach.StateMachine, label: str) -> FrozenSet[str]:

@@ -198,9 +198,10 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     way = _jump_path_named(top, resumption.begins_at) if resumption.begins_at else None
     if way is not None:
         stood.at = [way.first_label, BEFORE]
-    elif stood.sent is not None and (stood.moved_to or top.has(stood.label)):
+    elif stood.sent is not None:
         sent_to = stood.moved_to or stood.jumped_to
-        way = _jump_path_named(top, sent_to[len(top.path) + 1 :] or stood.label)
+        # none where it is gone, which is asked about below
+        way = jump_path_to(top, place_named(top, sent_to[len(top.path) + 1 :] or stood.label))
     if way is not None:
         leave_unconfirmed(top, way.first_label)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
@@ -392,7 +393,10 @@ class _Setting:
 
     def _ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
         """Have a person asked before a container begins that stood where it cannot go on."""
-        label = initial_label_of(node.machine)
+        labels, initial = list(node.labels()), initial_label_of(node.machine)
+        if not labels:
+            return  # it may add them as it is executed
+        label = initial if initial in labels else labels[0]
         stored.at, stored.asked = [label, BEFORE], []
         if node.site.is_container:
             self._resumed.enter_at(node.records, EntryPoint(node, stored))
@@ -410,7 +414,7 @@ class _Setting:
 
     def _ask_before(self, node: TreeNode, label: str) -> None:
         """Have a person asked before a state that had not begun, where nothing is to move."""
-        if self._resumption.asks:
+        if self._resumption.asks and node.has(label):
             self._interrupt(node, label, NOT_BEGUN)
 
     def _interrupt(self, node: TreeNode, label: str, text: str) -> None:

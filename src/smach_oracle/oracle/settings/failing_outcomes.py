@@ -7,6 +7,7 @@ from typing import Callable, Iterable, List, Optional, Pattern
 PREEMPTED = 'preempted'
 # the rule of earlier versions, by which their trials are counted. These come first of several
 FORMER_FAILING_OUTCOMES = ('aborted', 'failed', 'failure', 'error')
+_MOST_KNOWN = 1000  # names. A state may make up outcomes without end
 
 # what public programs call a failure, see doc/executive.md
 _FAILURES = frozenset(
@@ -52,16 +53,12 @@ class FailingNames:
         """`words`: those that a user has given. None means that the names' own words count."""
         self.by_name = words is None
         self.first = FORMER_FAILING_OUTCOMES if words is None else tuple(words)
-        self._names_failure: Callable[[str], bool] = _sounds_failing
-        if not self.by_name:
-            self._names_failure = _ends_with(self.first)
+        self._names_failure: Callable[[str], bool] = (
+            _sounds_failing if words is None else lru_cache(_MOST_KNOWN)(_ends_with(self.first))
+        )
 
     def __contains__(self, outcome: object) -> bool:
-        return (
-            isinstance(outcome, str)
-            and not is_preempted(outcome)
-            and self._names_failure(outcome)
-        )
+        return isinstance(outcome, str) and self._names_failure(outcome)
 
     def excuse(self, outcome: str) -> bool:
         """Whether an outcome is no failure of its state although it ends the container in one."""
@@ -74,7 +71,7 @@ def sounds_like_success(outcome: str) -> bool:
     return bool(words) and words[-1] in _SUCCESSES and not NEGATIONS.intersection(words)
 
 
-@lru_cache()
+@lru_cache(_MOST_KNOWN)
 def _sounds_failing(outcome: str) -> bool:
     words = words_of(outcome)
     if not words:
@@ -102,7 +99,9 @@ def _ends_with(words: Iterable[str]) -> Callable[[str], bool]:
     whole = _pattern(r'(?:^|.*[_\-])(?:{})$', words, re.IGNORECASE | re.DOTALL)
     capitalised = tuple(word[:1].upper() + word[1:] for word in words if word[:1].isalpha())
     camel = _pattern(r'.*[^\W_](?:{})$', capitalised, re.DOTALL)
-    return lambda outcome: bool(whole.match(outcome) or camel.match(outcome))
+    return lambda outcome: (
+        not is_preempted(outcome) and bool(whole.match(outcome) or camel.match(outcome))
+    )
 
 
 def _pattern(form: str, words: Iterable[str], flags: int) -> Pattern[str]:

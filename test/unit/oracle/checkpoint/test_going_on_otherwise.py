@@ -5,7 +5,7 @@ import os
 import shutil
 
 import pytest
-from killed_machines import Diary, KilledMachine, Points, in_a_process
+from killed_machines import Diary, KilledMachine, Noted, Points, in_a_process
 from killed_trees import ENDS, flat, make
 from left_stores import Left
 from test_accepted_stores import DAMAGES, accept
@@ -54,11 +54,62 @@ def test_nothing_moves_where_a_state_that_somebody_has_named_is_gone(tmp_path, c
     assert after.diary.count('begins') == begun
 
 
-def test_a_place_below_that_is_gone_is_named(tmp_path):
+def test_nothing_moves_where_a_place_below_that_somebody_has_named_is_gone(tmp_path):
     killed_while_it_runs(tmp_path, nested_after, 'B')
     after = KilledMachine(tmp_path, without(nested_after, 'C', ['IN']))
+    begun = after.diary.count('begins')
     oracle_state(after, 'goto', 'IN/C')
-    assert "'state:IN/C' is not allowed" in after.run()['error']
+    told = after.run()
+    assert told.get('ended_by') == 'kept', told
+    assert after.diary.count('begins') == begun
+
+
+def test_a_person_is_asked_where_a_state_has_moved_to_where_no_oracle_is(tmp_path):
+    before = KilledMachine(tmp_path, flat_before)
+    assert before.run(kill_at=6) is None
+    oracle_state(before, 'goto', 'B')
+    begun = before.diary.count('begins')
+    names = {'B': 'IN/B', 'C': 'IN/C'}
+    after = KilledMachine(tmp_path, nested_after, resume_map=names, tree={'nested': False})
+    told = after.run()
+    assert told.get('ended_by') == 'kept', told
+    assert after.diary.count('begins') == begun
+
+
+class Filled(smach.StateMachine):
+    """Adds its states as it is executed."""
+
+    def __init__(self, diary, points):
+        super().__init__(['succeeded', 'aborted'], ['done'], ['done'])
+        self._made = diary, points
+
+    def execute(self, *userdata):
+        if 'X' not in self.get_children():
+            with self:
+                smach.StateMachine.add('X', Noted('X', *self._made), {'succeeded': 'Y'})
+                smach.StateMachine.add('Y', Noted('Y', *self._made), ENDS)
+        return super().execute(*userdata)
+
+
+def filled_later(diary, points):
+    """Two states, between them a machine that is empty until it is executed."""
+    machine = smach.StateMachine(['succeeded', 'aborted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('A', Noted('A', diary, points), {'succeeded': 'LATER'})
+        smach.StateMachine.add('LATER', Filled(diary, points), {'succeeded': 'B'})
+        smach.StateMachine.add('B', Noted('B', diary, points), ENDS)
+    return machine
+
+
+@pytest.mark.parametrize('on_resume', ['recover', 'ask'])
+@pytest.mark.parametrize('kill_at', [8, 10, 12])
+def test_a_machine_that_is_empty_until_it_is_executed_begins_again(tmp_path, kill_at, on_resume):
+    killed = KilledMachine(tmp_path, filled_later, on_resume=on_resume)
+    assert killed.run(kill_at=kill_at) is None
+    told = killed.run()
+    assert told.get('outcome') == 'succeeded', told
+    assert told['done'] == ['A', 'X', 'Y', 'B']
 
 
 def test_before_a_state_that_has_moved_a_person_is_asked(tmp_path):
