@@ -34,6 +34,7 @@ from smach_oracle.oracle.checkpoint.stored_tree import StoredContainer, StoredTr
 from smach_oracle.oracle.checkpoint.structure import differences, structure_of
 from smach_oracle.oracle.decision.ways import PLACES, WayKind, WayResult
 from smach_oracle.oracle.machine.container_records import ContainerRecords
+from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.streaks import OpenStreak
 from smach_oracle.oracle.records.visits import VisitResult
 from smach_oracle.oracle.settings.settings import StateSettings
@@ -169,7 +170,7 @@ def _drawn_value(rng: random.Random) -> Any:
 
 def _of_containers(rng: random.Random, trial: Trial) -> Iterator[str]:
     """The records of a container, what is told of them, and of those with which it goes on."""
-    records, before = ContainerRecords(rng.choice((3, 9))), StoredContainer()
+    records, before = ContainerRecords(History(rng.choice((3, 9)))), StoredContainer()
     facts = _facts_of(records, before)
     streaks = records.streaks
     for _ in range(30):
