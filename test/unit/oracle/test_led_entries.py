@@ -5,7 +5,7 @@ import threading
 
 from guarded_machines import OUTCOMES, chain
 from held_machines import Held
-from machines import FakeExpert, Scripted, Watched, goto, watched
+from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
 from test_still_running import asked
 
 import smach
@@ -151,3 +151,16 @@ def test_a_watched_machine_that_was_entered_in_its_middle_begins_at_its_start_th
     assert watched.run() == 'done'
     led, whole = ['PICK', 'C', 'PLACE'], ['PICK', 'B', 'C', 'PLACE']
     assert watched.visits() == [*whole, *led, *whole]
+
+
+def test_a_machine_of_a_class_with_a_private_method_of_that_name_is_entered_in_its_middle():
+    class Own(smach.StateMachine):
+        def _start_elsewhere(self):
+            raise AssertionError('it is for the author alone')
+
+    inner = chain_of(Scripted(), Scripted(), machine_class=Own)
+    states = {'N': inner, 'LAST': Scripted('aborted')}
+    expert = FakeExpert(goto('B', container='TOP/N'))
+    watched = Watched(chain(**states), name='TOP', expert=expert, settings=ASKS)
+    assert watched.run() == 'done'
+    assert watched.visits() == ['N', 'A', 'B', 'LAST', 'N', 'B', 'LAST']

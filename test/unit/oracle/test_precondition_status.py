@@ -2,7 +2,8 @@
 about.
 """
 
-from machines import FakeExpert, Scripted, goto, watched
+from machines import FakeExpert, Scripted, goto, in_thread, watched
+from test_preconditions import Hanging, machine_with
 
 from smach_oracle.oracle.records.events import EventKind
 
@@ -117,3 +118,19 @@ def test_a_question_without_preconditions_has_nothing_to_look_at():
 def test_of_a_state_that_is_not_there_only_its_name_is_told():
     _, found = asked({'B': ['NOWHERE']}, strict=False)
     assert found == [(('B', 'NOWHERE'), None, 'only running NOWHERE would tell')]
+
+
+def test_a_function_that_was_left_behind_at_a_preempt_says_so_as_long_as_it_runs():
+    hanging = Hanging()
+    brief = {'states': {'B': {'grace_period_s': 0.05}}}
+    machine = machine_with(hanging, b=Scripted('aborted', 'aborted'), **brief)
+    run = in_thread(machine.run)
+    assert hanging.entered.wait(20)
+    machine.machine.request_preempt()
+    assert run.result() == 'preempted'
+    (end,) = machine.of(EventKind.PRECONDITION_END)
+    assert end.text == 'hanging was stopped by a preempt or a shutdown and was left behind'
+    assert in_thread(machine.run).result() == 'aborted'
+    hanging.leave()
+    why = 'hanging still runs since a preempt or a shutdown'
+    assert why in machine.of(EventKind.DECISION)[-1].text

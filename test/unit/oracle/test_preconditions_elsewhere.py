@@ -418,3 +418,21 @@ def test_a_machine_that_a_precondition_executes_by_hand_asks_nobody():
     assert machine.run() == 'done'
     assert [event.outcome for event in machine.of(EventKind.PRECONDITION_END)] == ['not met']
     assert not machine.of(EventKind.QUERY_OPENED)
+
+
+def test_what_it_did_not_write_is_not_handed_to_the_machine_above():
+    def write(key, value):
+        def step(state, ud):
+            ud[key] = value
+            return 'ok'
+
+        return Scripted(step, step, output_keys=['pose', 'cup'])
+
+    seeing = smach.StateMachine(outcomes=OUTCOMES, output_keys=['pose', 'cup'])
+    with seeing:
+        smach.StateMachine.add('LOOK', write('pose', 'found'), {'ok': 'done'})
+    seeing.userdata.cup = 'unknown'
+    machine = chain(SEE=seeing, PAINT=write('cup', 'red'), PICK=Scripted('aborted'))
+    watched = wrapped(machine, 'PICK', 'SEE/LOOK')
+    assert watched.run() == 'done' and len(ends(watched)) == 1
+    assert contents(watched.machine.userdata) == {'pose': 'found', 'cup': 'red'}
