@@ -230,3 +230,16 @@ def test_one_that_has_failed_after_its_last_item_begins_again():
     iterator._exhausted_outcome = 'aborted'
     total_of(machine_of(iterator), goto('ALL'), supersede('done'), max_recoveries=0)
     assert each.runs == 4
+
+
+def test_the_machine_says_behind_which_item_none_can_be_got():
+    def items():
+        yield 1
+        raise ValueError('dry')
+
+    machine = machine_of(over(Scripted(), items=items()))
+    settings, expert = {'max_recoveries': 0}, FakeExpert(supersede('done'))
+    watched = Watched(machine, name='TOP', settings=settings, expert=expert)
+    assert watched.run() == 'done'
+    texts = [event.text for event in watched.of(EventKind.WARNING)]
+    assert texts == ["cannot get the item behind item 1: ValueError('dry')"]

@@ -25,9 +25,9 @@ class TrackedItems:
     def __init__(self, given: Items, tell: Tell) -> None:
         """`given`: an iterable, or a callable that returns one. `tell` takes words for the log."""
         self.given = given
-        self.goes_on = False
+        self.goes_on: bool
         self.begins: Optional[Callable[[], None]] = None  # called as an item begins
-        self.begins_with = 1  # number of the item that is the first where it begins again
+        self.begins_with: int  # number of the item that is the first where it begins again
         self.number = 0  # of the item under way, from 1. 0 means none
         self.is_finished = True  # the item under way
         self.is_exhausted = False
@@ -36,7 +36,7 @@ class TrackedItems:
         self._items: Optional[Iterator[object]] = None
         self._item: object = None
         self._error: Optional[Exception] = None
-        self._is_pending = False  # whether the item under way is handed out once more
+        self._is_pending: bool  # whether the item under way is handed out once more
 
     def has_rest(self) -> bool:
         """Whether it has begun and items may be left, the unfinished one among them."""
@@ -129,7 +129,6 @@ class TrackedItems:
 
     def _hand_out(self) -> Iterator[object]:
         again = [self._item] if self._is_pending else []
-        self._is_pending = False
         self.number -= len(again)
         try:
             for item in itertools.chain(again, cast(Iterator[object], self._items)):

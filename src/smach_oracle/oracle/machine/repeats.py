@@ -162,8 +162,6 @@ def why_closed(node: TreeNode, label: str) -> str:
 
 def repeated_by_running(node: TreeNode, label: str) -> Tuple[str, ...]:
     """Return the guarded states that would be repeated if a state were run as a precondition."""
-    if not node.tree.numbers_visits:
-        return ()
     return tuple(done.name for done in _done_within(node, label))
 
 

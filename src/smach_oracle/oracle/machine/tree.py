@@ -66,7 +66,7 @@ class Tree:
         self.trial_id = ''
         self.is_resumed = False  # whether the trial goes on after its program was stopped
         self.rates_loaded = ''  # the rates file read last
-        self._questions = 0
+        self._questions: int  # in this trial
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
         self.process = os.getpid()
         self.be_at_rest(expert, health)

@@ -59,12 +59,11 @@ class Workers:
             return ''
         with self._lock:
             abandoned = self.abandoned.get(id(target))
-            if abandoned is None:
-                return ''
-            if abandoned.call.is_alive():
-                return abandoned.why
-            del self.abandoned[id(target)]
-            return ''
+            if abandoned is not None:
+                if abandoned.call.is_alive():
+                    return abandoned.why
+                del self.abandoned[id(target)]
+        return ''
 
     def run(
         self,
@@ -134,10 +133,9 @@ class Workers:
         """
         thread, limit_s = self._take_thread(), settings.time_limit_s
         call = BackgroundCall(functools.partial(function, userdata), _FUNCTION, kept=thread)
-        within = scope if limit_s is None else Scope(scope, limit_s=limit_s)
         end = None
         try:
-            end = within.run(call, settings.grace_period_s, gate.shut)
+            end = Scope(scope, limit_s=limit_s).run(call, settings.grace_period_s, gate.shut)
         finally:
             if call.was_left_behind:
                 self._block(function, call, _LATE if end is CallEnd.OVERRUN else _STOPPED)
