@@ -162,6 +162,8 @@ def why_closed(node: TreeNode, label: str) -> str:
 
 def repeated_by_running(node: TreeNode, label: str) -> Tuple[str, ...]:
     """Return the guarded states that would be repeated if a state were run as a precondition."""
+    if not node.tree.numbers_visits:
+        return ()  # nothing is guarded: the tree need not be looked through
     return tuple(done.name for done in _done_within(node, label))
 
 
