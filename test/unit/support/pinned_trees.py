@@ -34,6 +34,7 @@ from tree_model.plan import TreePlan
 import smach
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
+from smach_oracle.oracle.control import control
 from smach_oracle.oracle.decision.policies import POLICIES
 from smach_oracle.oracle.errors import OperatorError
 from smach_oracle.oracle.execution import trial, visiting
@@ -81,6 +82,8 @@ DRAWN = re.compile(r'\b(MOMENT|number:|seq:|after:) \d+')
 class Told(Executed):
     """A tree under an oracle; `lines` has all that it tells."""
 
+    LOGS_TRANSITIONS = False  # as events say them
+
     def __init__(self, plan: TreePlan, **settings: Any) -> None:
         self.lines: List[str] = []
         self._more = settings
@@ -96,6 +99,8 @@ class Told(Executed):
         return _Asked(self) if self.plan.has_expert else None
 
     def _tell(self, event: Any) -> None:
+        texts = (event.outcome, event.target, event.query_id, event.by, event.text)
+        assert all(isinstance(text, str) for text in texts)
         place = '/'.join(filter(None, (event.path, event.state)))
         self.tell(
             '{:15} {}'.format(event.kind.name, place), event._replace(kind=0, path='', state='')
@@ -110,7 +115,11 @@ class Told(Executed):
 
         No state takes any time: who is slow on a busy computer would be a dearer way.
         """
-        with logged(self.tell), mock.patch.object(visiting, 'monotonic', lambda: 0.0):
+        with contextlib.ExitStack() as stack:
+            stack.enter_context(logged(self.tell, self.LOGS_TRANSITIONS))
+            stack.enter_context(mock.patch.object(visiting, 'monotonic', lambda: 0.0))
+            # nothing settles while a command waits, which comes in the thread of the machine
+            stack.enter_context(mock.patch.object(control, '_SETTLE_S', 0.001))
             for _ in range(trials):
                 self.lines.append('= {}'.format(self.execute()))
             self.tell('RATES', self.machine.rates())
@@ -145,11 +154,15 @@ class Operated(Told):
         if event.kind is EventKind.STATE_START and self._chance.random() < 0.4:
             self._command()
         elif event.kind is EventKind.HOLD_START:
-            while self._holds() and self._left > 0 and self._chance.random() < 0.8:
-                self._command()
-            for let_go in (self._hand.resume, self._hand.confirm):
-                if self._holds():
-                    self._say(partial(let_go, by='eva'))
+            self._held()
+
+    def _held(self) -> None:
+        """Give some commands, and let go what waits then."""
+        while self._holds() and self._left > 0 and self._chance.random() < 0.8:
+            self._command()
+        for let_go in (self._hand.resume, self._hand.confirm):
+            if self._holds():
+                self._say(partial(let_go, by='eva'))
 
     def _holds(self) -> bool:
         return any(each.held_by for each in self._hand.status().active)
@@ -355,13 +368,13 @@ def _plain(value: Any) -> Any:
 
 
 @contextlib.contextmanager
-def logged(note: Callable[[str, str], None]) -> Iterator[None]:
-    """Pass on what the executive logs, not what an engine does."""
+def logged(note: Callable[[str, str], None], transitions: bool = False) -> Iterator[None]:
+    """Pass on what the executive logs, not what an engine does. `transitions`: those, too."""
 
     def noting(name: str) -> Callable[[Any], None]:
         def log(text: Any) -> None:
             if sys._getframe(1).f_globals['__name__'].startswith('smach_oracle'):
-                if not str(text).startswith('State machine transitioning'):  # as an event says
+                if transitions or not str(text).startswith('State machine transitioning'):
                     note(name[3:].upper(), str(text))
 
         return log

@@ -74,6 +74,7 @@ class Scripted(smach.State):
         self._path = path
         self.around: Any = None
         self.plan_label = plan.label
+        self.at_preempt = 'obeys'  # serves: it services a preempt, and goes on. ignores
         self._executions = 0
         self._asked = threading.Event()
 
@@ -99,9 +100,10 @@ class Scripted(smach.State):
         if action.kind == 'preempt' and world.takes_preempt():
             world.top.request_preempt()
             self._await_preempt()
-        if self.preempt_requested():
+        if self.preempt_requested() and self.at_preempt != 'ignores':
             self.service_preempt()
-            return action.outcome if action.kind == 'preempt' else 'preempted'
+            if self.at_preempt == 'obeys':
+                return action.outcome if action.kind == 'preempt' else 'preempted'
         if action.kind == 'raise':
             raise RuntimeError('as the script says')
         return action.outcome

@@ -1,0 +1,38 @@
+"""What trees tell that are held, sent and stopped does not change, and is the same for each engine.
+
+`python3 test/unit/support/pinned_stops.py FOLDER --pin` writes all again
+(test/data/pinned/README.md).
+"""
+
+import threading
+
+import pinned_stops
+import pytest
+from pinned import held
+from pinned_trees import digests, name_of
+
+import smach
+
+PINNED = dict(line.split(' ', 1) for line in held('stops'))
+
+
+@pytest.fixture(autouse=True)
+def quiet(monkeypatch):
+    """Upstream's Concurrence lets its threads raise."""
+    monkeypatch.setattr(threading, 'excepthook', lambda *said: None)
+    yield
+    smach.set_shutdown_check(lambda: False)
+
+
+@pytest.mark.parametrize('first', range(0, pinned_stops.STOPPED, 20))
+def test_trees_that_are_stopped_tell_the_same_as_ever(first):
+    for number in range(first, first + 20):
+        name = name_of(number, 'stopped')
+        assert digests(pinned_stops.tell(number)) == PINNED[name], name
+
+
+@pytest.mark.parametrize('first', range(0, pinned_stops.UNOBSERVED, 20))
+def test_trees_that_nobody_observes_do_the_same_as_ever(first):
+    for number in range(first, first + 20):
+        name = name_of(number, 'unobserved')
+        assert digests(pinned_stops.tell_unobserved(number)) == PINNED[name], name
