@@ -83,6 +83,7 @@ def _take_notice(wrapper: ContainerWrapper, parent: TreeNode, labels: Labels) ->
 
 
 def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
+    """Make a branch, which is then adopted as a nested machine is."""
     parent, container = wrapper.parent, wrapper.container
     is_item = isinstance(wrapper, IteratorWrapper)
     branch = Branch(label, is_alone=is_item)
@@ -92,6 +93,4 @@ def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
     set_mark(branch, node)
     renew_attributes(branch)
     node.in_force.inherit(parent.in_force)
-    node.lie_below(parent, wrapper.labels_from_parent)
-    node.configure(parent.settings)
     return branch

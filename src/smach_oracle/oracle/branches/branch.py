@@ -75,9 +75,8 @@ class Branch(smach.Container):
         self.userdata = container.userdata
         self.state = self._states[label] = state
         self._remappings[label] = {} if self.hands_on_userdata else remapping_of(container, label)
-        if set(self._outcomes) != set(outcomes) or label not in self._transitions:
-            self._outcomes = set(outcomes)
-            self._transitions[label] = dict.fromkeys(outcomes)
+        self._outcomes = set(outcomes)
+        self._transitions[label] = dict.fromkeys(outcomes)
 
     def begin(self, item: Optional[ItemPort]) -> None:
         """Begin an execution of the Concurrence, for which there is no `item`, or Iterator."""

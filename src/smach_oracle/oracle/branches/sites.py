@@ -1,7 +1,7 @@
 """The sites of branches: plain states of a Concurrence or an Iterator."""
 
 from dataclasses import replace
-from typing import Any, Optional, Tuple
+from typing import Any, Optional, Tuple, cast
 
 import smach
 
@@ -142,11 +142,11 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
 
     By its name alone where another Concurrence or Iterator is around it.
     """
-    parent = node.parent
-    if parent is None or len(node.labels_from_parent) != 1:
+    labels = node.labels_from_parent
+    if len(labels) != 1:
         return outcome in node.in_force.failing
-    (label,) = node.labels_from_parent
-    return judged_at(parent, label, outcome)[1] is not FailureKind.NOT_A_FAILURE
+    parent = cast(TreeNode, node.parent)
+    return judged_at(parent, labels[0], outcome)[1] is not FailureKind.NOT_A_FAILURE
 
 
 def _entries(given: object) -> Tuple[Tuple[Any, object], ...]:

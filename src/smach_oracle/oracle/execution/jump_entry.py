@@ -69,7 +69,7 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     """
     missing = missing_on(way, written)
     node, label = way.entered_places[-1]
-    if not missing or node is not way.meeting_node:  # keys of its own may have the same names
+    if node is not way.meeting_node:  # keys of its own may have the same names
         return missing
     remapping = remapping_of(node.machine, label)
     return tuple(key for key in missing if remapping.get(key, key) not in written)

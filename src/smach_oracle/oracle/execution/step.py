@@ -41,6 +41,7 @@ from ..recovery.verdict import (
     natural_ending,
     preempted_ending,
 )
+from ..scope.scope import Reason
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
@@ -89,7 +90,7 @@ class Step:
 
     def _what_follows(self, outcome: Any, error: Optional[Exception]) -> Union[Occasion, Stop]:
         """Return why the oracle is entered, or that the machine has gone on without it."""
-        node, machine, record = self._node, self._machine, self._record
+        node, record = self._node, self._record
         if error is not None:
             top = node.top()
             too_deep = too_deep_below(error) or too_deep_here(top.machine, top.path, error)
@@ -112,7 +113,7 @@ class Step:
         reason = node.execution.scope.reason
         stopping = reason is not None or ends_program(error)
         # a request that comes from here on has come after the end of the state
-        if reason is not None and machine.preempt_requested():
+        if reason is Reason.PREEMPTED:
             node.execution.tell_preempt()
             note_end_under_preempt(
                 node, record.label, outcome if isinstance(judged, Route) else None
@@ -125,11 +126,7 @@ class Step:
             result = VisitResult.PREEMPTED if is_stopped else VisitResult.SUCCESS
             node.records.visit_ended(record, outcome, result)
             failing, listed = node.in_force.failing, record.settings.failure_outcomes
-            may_fail = (
-                outcome in failing
-                or outcome in listed
-                or (not judged.is_state and judged.target in failing)
-            )
+            may_fail = outcome in failing or outcome in listed or judged.target in failing
             learn = result is VisitResult.SUCCESS and not may_fail
             facts = self._facts_of_stop(outcome) if stopping else NO_FACTS
             return self._advance(outcome, judged, learn, facts)
@@ -316,7 +313,7 @@ class Step:
         if record.failure_class is not FailureClass.HIGH:
             return
         if node.records.history.keeps_failing(record.label):
-            target = failure.route.target if failure.route is not None else ''
+            target = cast(Route, failure.route).target  # by which the author recovers
             node.warn_once('own loop', OWN_LOOP.format(failure.outcome, target), record.label)
 
     # -- without the oracle

@@ -62,9 +62,10 @@ class AlarmClock:
                 ring = min(self._due_s, key=lambda each: self._due_s[each])
                 left_s = self._due_s[ring] - self._clock.now()
                 self._wakes_s = self._due_s[ring]
-                if left_s <= 0:
+                is_due = left_s <= 0
+                if is_due:
                     del self._due_s[ring]
-            if left_s <= 0:
+            if is_due:
                 _call(ring)
             else:
                 del ring  # it holds a machine, which may go meanwhile
