@@ -350,3 +350,10 @@ def test_a_shallow_copy_has_branches_of_its_own():
     assert [(each.path, each.state) for each in other.of(EventKind.FAILURE)] == [
         ('OTHER/ALL', 'LEFT')
     ]
+
+
+def test_only_the_branches_that_are_named_have_an_oracle_of_their_own():
+    machine = inside(both(Scripted(), Scripted()), 'BOTH')
+    wrapped = OracleContainer.wrap(machine, nested=['BOTH/LEFT'])
+    assert wrapped.execute() == 'done'
+    assert {row.state for row in wrapped.rates()} == {'BOTH', 'LEFT'}

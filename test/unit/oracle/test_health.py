@@ -20,6 +20,7 @@ from machines import (
 from waiting import stays, wait_for
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind
 
 SETTLE_S = 0.05
@@ -455,3 +456,13 @@ def test_who_fails_while_another_branch_waits_for_a_well_robot_waits_too(health,
     health.now = ''
     assert run.result() == 'done' and not machine.of(EventKind.FAILURE)
     assert later.runs == 2
+
+
+def test_nobody_is_asked_any_more_once_the_machine_is_only_observed():
+    health = FakeHealth()
+    machine = watched(Scripted('aborted', 'ok', 'aborted'), health=health)
+    assert machine.run() == 'done' and health.asked
+    health.asked = 0
+    smach_machine = machine.machine
+    OracleContainer.wrap(smach_machine, recover=False)
+    assert machine.run() == 'aborted' and not health.asked

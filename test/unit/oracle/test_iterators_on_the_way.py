@@ -270,3 +270,23 @@ def test_an_item_counts_among_the_keys_that_a_state_finds():
     Watched(machine, name='TOP', expert=expert, settings=ASKS).run()
     missing = {choice.state: choice.missing_keys for choice in expert.questions[0].choices}
     assert missing['HOLD'] == ('grip',)
+
+
+def test_an_iterator_keeps_what_came_to_its_userdata_since_it_began():
+    def writes(state, ud):
+        ud.note = 'of item 2'
+        return 'aborted'
+
+    each = Item(item2=[writes])
+    each.register_io_keys(['note'])
+    items = iterator_over(each)
+    items.register_io_keys(['note'])
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('LOOK', Scripted('ok', 'aborted'), {'ok': 'ALL'})
+        smach.StateMachine.add('ALL', items, {'done': 'done', 'aborted': 'LOOK'})
+    expert = FakeExpert(give_up('aborted'), goto('ALL'))
+    watched = Watched(machine, name='TOP', expert=expert, settings={**ASKS, 'userdata': 'keep'})
+    assert watched.run() == 'done'
+    assert each.tried == [1, 2, 2, 3, 4] and machine.userdata.note == 'of item 2'

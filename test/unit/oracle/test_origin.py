@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import pytest
+from machines import Scripted, watched
 
 import smach
 from smach_oracle import __version__
@@ -174,3 +175,11 @@ def test_inputs_are_those_at_the_start_of_each_trial():
         machine.execute()
     starts = [event for event in seen if event.kind == EventKind.TRIAL_START]
     assert [event.data['inputs'] for event in starts] == [{'count': each} for each in range(3)]
+
+
+def test_the_engine_of_this_package_is_known():
+    machine = watched(Scripted())
+    machine.run()
+    (start,) = machine.of(EventKind.TRIAL_START)
+    is_own = not os.environ.get('SMACH_UPSTREAM')
+    assert (start.data['origin']['engine'] == 'own') is is_own

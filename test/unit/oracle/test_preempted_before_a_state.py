@@ -265,3 +265,49 @@ def test_a_state_that_is_not_to_be_repeated_is_passed_by_at_a_preempt():
     with held.begin():
         assert held.end() == 'preempted'
     assert trail.ran == ['A', 'B', 'A', 'CLEAN']
+
+
+def with_clean_ups(trail, ends):
+    """PICK, each of whose states has a clean-up of its own, or ends it so; FIND leads to it."""
+    inner = smach.StateMachine([*OUTCOMES, 'stopped'])
+    with inner:
+        for label, following in (('X', 'Y'), ('Y', 'done')):
+            target = ends or 'CLEAN_' + label
+            smach.StateMachine.add(
+                label, trail.state(label), {'ok': following, 'preempted': target}
+            )
+        for label in ('CLEAN_X', 'CLEAN_Y'):
+            smach.StateMachine.add(label, trail.state(label), {'ok': 'preempted'})
+    machine = smach.StateMachine(OUTCOMES)
+    with machine:
+        smach.StateMachine.add('FIND', trail.state('FIND', 'aborted', 'ok'), {'ok': 'PICK'})
+        smach.StateMachine.add('PICK', inner, {'stopped': 'PUT_BACK'})
+        smach.StateMachine.add('PUT_BACK', trail.state('PUT_BACK'), {'ok': 'preempted'})
+    return machine
+
+
+def led_to_y(machine):
+    expert = FakeExpert(goto('Y', container='SM_ROOT/PICK'))
+    held = Held(machine, expert=expert, settings={'max_recoveries': 0})
+    held.hand.set_breakpoint('PICK')
+    return held.begin()
+
+
+@pytest.mark.parametrize('ends, cleans', [('', 'CLEAN_Y'), ('stopped', 'PUT_BACK')])
+def test_a_machine_that_was_led_within_cleans_up_behind_the_state_it_was_led_to(ends, cleans):
+    trail = Trail()
+    with led_to_y(with_clean_ups(trail, ends)) as held:
+        held.waits_before('SM_ROOT/PICK')
+        held.hand.remove_breakpoint('PICK')
+        by_operator(held)
+        assert (held.end(), trail.ran) == ('preempted', ['FIND', cleans])
+
+
+def test_a_state_from_which_an_operator_sends_the_machine_is_begun_from_its_start_later():
+    trail = Trail()
+    with led_to_y(with_clean_ups(trail, '')) as held:
+        held.waits_before('SM_ROOT/PICK')
+        held.hand.remove_breakpoint('PICK')
+        held.hand.go_to('SM_ROOT', 'FIND')
+        held.hand.resume()
+        assert (held.end(), trail.ran) == ('done', ['FIND', 'FIND', 'X', 'Y'])

@@ -7,6 +7,7 @@ import pytest
 from fake_clock import FakeClock
 from machines import in_thread
 
+from smach_oracle.oracle.scope.alarm_clock import AlarmClock
 from smach_oracle.oracle.scope.background_call import BackgroundCall
 from smach_oracle.oracle.scope.clock import Clock, Flag, PausableClock
 from smach_oracle.oracle.scope.scope import LOOK_S, CallEnd, Reason, Scope, standing_still
@@ -249,3 +250,10 @@ def test_the_time_of_a_limit_that_others_pause_is_given_back():
     assert not go.is_set()
     clock.advance(31.0)
     assert ended.result() is CallEnd.OVERRUN and not call.was_left_behind
+
+
+def test_an_alarm_rings_at_its_time():
+    alarms, rung = AlarmClock(FakeClock()), threading.Event()
+    alarms.ring_in(0.0, rung.set)
+    assert rung.wait(20.0)
+    alarms.rest()

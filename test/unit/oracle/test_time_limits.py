@@ -384,3 +384,11 @@ def test_where_nobody_is_asked_an_overrun_ends_the_machine_as_badly_as_it_can(
         settings={'policy': 'always_ask', **LIMITED},
     )
     assert machine.run() == ends
+
+
+def test_a_state_that_is_only_observed_runs_in_its_machines_thread_whatever_its_limit():
+    threads = []
+    state = Scripted(lambda state, ud: threads.append(threading.current_thread()) or 'ok')
+    machine = watched(state, recover=False, settings={'states': {'A': LIMITED}})
+    assert machine.run() == 'done'
+    assert threads == [threading.current_thread()]

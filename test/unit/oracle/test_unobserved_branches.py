@@ -6,8 +6,10 @@ import threading
 
 import pytest
 from branch_machines import Item, both, inside, iterator_over
+from guarded_machines import chain
 from machines import FakeExpert, Scripted, chain_of, give_up, goto, supersede
 from test_pinned_branches import rows_of
+from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -148,3 +150,28 @@ def test_the_end_of_a_machine_on_the_short_way_is_counted():
     assert [machine.execute() for _ in range(4)] == ['done'] * 4
     assert [row.successes for row in machine.rates()] == [4, 4]
     assert sum(row.count for row in machine.transition_counts()) == 8
+
+
+def active(hand):
+    return {'{}/{}'.format(each.path, each.state) for each in hand.status().active}
+
+
+def test_a_branch_that_has_ended_on_the_short_way_is_not_active():
+    """Neither while another one runs, nor behind its container."""
+    seen = []
+
+    def looks(state, ud):
+        assert wait_for(lambda: 'TOP/BOTH/LEFT' not in active(hand), 20.0)
+        seen.append(active(hand))
+        return 'ok'
+
+    machine = chain(
+        BOTH=both(Scripted(), Scripted('ok', looks)),
+        ALL=iterator_over(Item(), (1, 2), outcomes=('done', 'preempted')),
+        LAST=Scripted('ok', lambda state, ud: seen.append(active(hand)) or 'ok'),
+    )
+    machine.userdata.done = []
+    wrapped = OracleContainer.wrap(machine, name='TOP')
+    hand = OperatorHand(wrapped)
+    assert [wrapped.execute(), wrapped.execute()] == ['done', 'done']
+    assert seen == [{'TOP/BOTH', 'TOP/BOTH/RIGHT'}, {'TOP/LAST'}]
