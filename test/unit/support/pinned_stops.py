@@ -30,7 +30,7 @@ STOPPED, UNOBSERVED = 60, 60
 TRIALS = 3
 LOOPS: Tuple[Tuple[str, ...], ...] = (('ok',), ('ok', 'again'), ())
 HELD = re.compile(': (paused|waits for a confirmation).* before ')
-MANNERS = ('obeys', 'obeys', 'obeys', 'serves', 'ignores')
+MANNERS = ('obeys', 'obeys', 'obeys', 'serves', 'leaves', 'ignores')
 
 
 class Stopped(Operated):

@@ -74,7 +74,8 @@ class Scripted(smach.State):
         self._path = path
         self.around: Any = None
         self.plan_label = plan.label
-        self.at_preempt = 'obeys'  # serves: it services a preempt, and goes on. ignores
+        # serves: it services a preempt, and goes on. leaves: it ends, and services none. ignores
+        self.at_preempt = 'obeys'
         self._executions = 0
         self._asked = threading.Event()
 
@@ -101,8 +102,9 @@ class Scripted(smach.State):
             world.top.request_preempt()
             self._await_preempt()
         if self.preempt_requested() and self.at_preempt != 'ignores':
-            self.service_preempt()
-            if self.at_preempt == 'obeys':
+            if self.at_preempt != 'leaves':
+                self.service_preempt()
+            if self.at_preempt != 'serves':
                 return action.outcome if action.kind == 'preempt' else 'preempted'
         if action.kind == 'raise':
             raise RuntimeError('as the script says')
