@@ -355,5 +355,12 @@ def test_a_shallow_copy_has_branches_of_its_own():
 def test_only_the_branches_that_are_named_have_an_oracle_of_their_own():
     machine = inside(both(Scripted(), Scripted()), 'BOTH')
     wrapped = OracleContainer.wrap(machine, nested=['BOTH/LEFT'])
-    assert wrapped.execute() == 'done'
-    assert {row.state for row in wrapped.rates()} == {'BOTH', 'LEFT'}
+    assert [wrapped.execute(), wrapped.execute()] == ['done', 'done']
+    assert {row.state: row.successes for row in wrapped.rates()} == {'BOTH': 2, 'LEFT': 2}
+
+
+def test_an_iterator_without_an_oracle_begins_again():
+    each = Item(item2=['aborted'])
+    machine = Watched(inside(iterator_over(each)), nested=False)
+    assert machine.run() == 'done'
+    assert each.tried == [1, 2, 1, 2, 3, 4]

@@ -174,3 +174,34 @@ def test_a_state_that_is_given_as_a_precondition_is_held_by_a_pause_alone(autono
         assert held.end() == 'done'
     by = [event.by for event in held.of(EventKind.HOLD_START)]
     assert by == (['', ''] if autonomy == 'confirm' else [held.of(EventKind.HOLD_START)[0].by])
+
+
+def holds_of(held):
+    """How often it waits, with a breakpoint before each item."""
+    held.hand.set_breakpoint('ITEM')
+    held.machine.events.observers.append(
+        lambda event: held.hand.resume() if event.kind is EventKind.HOLD_START else None
+    )
+    assert held.run() == 'done'
+    return len(held.of(EventKind.HOLD_START))
+
+
+@pytest.mark.parametrize('before, now', [(False, True), (True, False), (True, ['OTHER'])])
+def test_each_item_is_held_once_whatever_was_nested_before(before, now):
+    machine = items_machine(Scripted())
+    OracleContainer.wrap(machine, nested=before, strict=False)
+    if now is not True:
+        unwrap(machine)
+    held = Held(machine, nested=now, strict=False)
+    assert holds_of(held) == 3
+
+
+def test_an_iterator_that_is_used_elsewhere_is_held_there_alone():
+    first = items_machine(Scripted())
+    iterator, second = first['EACH'], smach.StateMachine(['done', 'aborted', 'preempted'])
+    with second:
+        smach.StateMachine.add('EACH', iterator)
+    before, now = Held(first, nested=False), Held(second, nested=False)
+    before.hand.pause()
+    assert now.run() == 'done' and not now.of(EventKind.HOLD_START)
+    assert holds_of(now) == 3
