@@ -203,5 +203,5 @@ def test_an_iterator_that_is_used_elsewhere_is_held_there_alone():
         smach.StateMachine.add('EACH', iterator)
     before, now = Held(first, nested=False), Held(second, nested=False)
     before.hand.pause()
-    assert now.run() == 'done' and not now.of(EventKind.HOLD_START)
+    assert now.begin().end() == 'done' and not now.of(EventKind.HOLD_START)
     assert holds_of(now) == 3
