@@ -8,6 +8,7 @@ import threading
 
 import pytest
 from branch_machines import Item, both, inside, iterator_over
+from guarded_machines import chain
 from machines import FakeExpert, Scripted, Watched, goto
 from waiting import wait_for
 
@@ -363,4 +364,35 @@ def test_an_iterator_without_an_oracle_begins_again():
     each = Item(item2=['aborted'])
     machine = Watched(inside(iterator_over(each)), nested=False)
     assert machine.run() == 'done'
+    assert each.tried == [1, 2, 1, 2, 3, 4]
+
+
+def test_a_copy_that_a_state_executes_tells_nothing_of_branches():
+    concurrence, ended = both(Scripted(), Scripted()), []
+
+    def by_hand(state, ud):
+        ended.append(copy.copy(concurrence).execute(smach.UserData()))
+        return 'ok'
+
+    machine = Watched(chain(HAND=Scripted(by_hand), BOTH=concurrence), name='TOP')
+    assert (machine.run(), ended) == ('done', ['done'])
+    starts = [event.path for event in machine.of(EventKind.CONTAINER_START)]
+    assert starts == ['TOP', 'TOP/BOTH']
+
+
+def test_an_item_that_raises_has_failed_though_all_else_leads_to_the_next():
+    each = Item(item2=[ValueError('slipped')])
+    machine = Watched(inside(iterator_over(each, break_outcomes=['aborted', 'preempted'])))
+    assert machine.run() == 'done'
+    assert each.tried == [1, 2, 2, 3, 4]
+
+
+def test_an_iterator_that_is_executed_by_hand_goes_through_all_its_items():
+    each = Item(item2=['aborted'])
+    iterator = iterator_over(each)
+    machine = OracleContainer.wrap(inside(iterator), recover=False)
+    assert machine.execute() == 'aborted'
+    userdata = smach.UserData()
+    userdata.done = []
+    assert iterator.execute(userdata) == 'done'
     assert each.tried == [1, 2, 1, 2, 3, 4]

@@ -175,3 +175,31 @@ def test_a_branch_that_has_ended_on_the_short_way_is_not_active():
     hand = OperatorHand(wrapped)
     assert [wrapped.execute(), wrapped.execute()] == ['done', 'done']
     assert seen == [{'TOP/BOTH', 'TOP/BOTH/RIGHT'}, {'TOP/LAST'}]
+
+
+def test_each_item_of_a_state_with_a_time_limit_runs_in_another_thread():
+    threads = []
+    each = Scripted(*[lambda state, ud: threads.append(threading.current_thread()) or 'ok'] * 3)
+    machine = OracleContainer.wrap(
+        inside(iterator_over(each, (1, 2, 3))),
+        settings={'states': {'ALL/EACH': {'time_limit_s': 30.0}}},
+    )
+    assert machine.execute() == 'done'
+    assert len(threads) == 3 and threading.current_thread() not in threads
+
+
+def test_a_preempt_on_the_short_way_reaches_the_state_in_each_execution():
+    """The first item, whose container has begun anew, and an item behind others."""
+    reached = []
+
+    def is_reached(state, ud):
+        machine.request_preempt()
+        reached.append(state.preempt_requested())
+        state.service_preempt()
+        return 'preempted'
+
+    for at in (1, 3):
+        each = Scripted(*['ok'] * 3, *['ok'] * (at - 1), is_reached)
+        machine = OracleContainer.wrap(inside(iterator_over(each, (1, 2, 3))))
+        assert [machine.execute(), machine.execute()] == ['done', 'preempted']
+    assert reached == [True, True]
