@@ -385,6 +385,7 @@ def test_an_item_that_raises_has_failed_though_all_else_leads_to_the_next():
     machine = Watched(inside(iterator_over(each, break_outcomes=['aborted', 'preempted'])))
     assert machine.run() == 'done'
     assert each.tried == [1, 2, 2, 3, 4]
+    assert [event.state for event in machine.of(EventKind.FAILURE)] == ['EACH']
 
 
 def test_an_iterator_that_is_executed_by_hand_goes_through_all_its_items():

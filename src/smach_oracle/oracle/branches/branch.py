@@ -126,7 +126,7 @@ class Branch(smach.Container):
             record.snapshot = snapshot = data_of(self.userdata).copy()
             if self._item is not None:
                 self._item.at_item = snapshot
-            if self._current_state is not state or not self._is_running:
+            if self._current_state is not state:
                 # a request reaches it from now on
                 self._set_current_state(record.label)
                 self._is_running = True
