@@ -380,11 +380,13 @@ def test_a_copy_that_a_state_executes_tells_nothing_of_branches():
     assert starts == ['TOP', 'TOP/BOTH']
 
 
-def test_an_item_that_raises_has_failed_though_all_else_leads_to_the_next():
-    each = Item(item2=[ValueError('slipped')])
-    machine = Watched(inside(iterator_over(each, break_outcomes=['aborted', 'preempted'])))
-    assert machine.run() == 'done'
-    assert each.tried == [1, 2, 2, 3, 4]
+def test_an_item_that_raises_has_failed_though_no_outcome_leads_to_the_next():
+    each = Item(item1=[ValueError('slipped')])
+    iterator = iterator_over(
+        each, outcomes=('ok', 'aborted', 'preempted', 'done'), loop_outcomes=[]
+    )
+    machine = Watched(inside(iterator, transitions={'ok': 'done'}))
+    assert (machine.run(), each.tried) == ('done', [1, 1])
     assert [event.state for event in machine.of(EventKind.FAILURE)] == ['EACH']
 
 
