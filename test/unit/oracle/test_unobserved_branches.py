@@ -189,7 +189,7 @@ def test_each_item_of_a_state_with_a_time_limit_runs_in_another_thread():
 
 
 def test_a_preempt_on_the_short_way_reaches_the_state_in_each_execution():
-    """The first item, whose container has begun anew, and an item behind others."""
+    """The first item, whose container begins once more, and an item behind others."""
     reached = []
 
     def is_reached(state, ud):
