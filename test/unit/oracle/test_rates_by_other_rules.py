@@ -40,6 +40,8 @@ def test_rates_that_were_learned_by_another_rule_stay_and_that_is_told_once(tmp_
     assert 'by a list: aborted' in text and 'by name, version 1' in text
     run(path)
     assert len(said(log)) == 1, 'now the file has the new rule'
+    run(path, failing_outcomes=['aborted'])
+    assert len(said(log)) == 2, 'and a list is another rule again'
 
 
 def test_a_file_of_an_earlier_version_names_none_which_is_told_once_where_it_may_differ(

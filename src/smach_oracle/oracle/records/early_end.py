@@ -17,15 +17,16 @@ class EarlyEnd:
     It cancels the scope of the trial. Any thread may call it.
     """
 
+    why: Optional[TrialEnd]  # None: it has not come
+    # sys.exit or Ctrl-C in a thread: the error of a Concurrence need not have it as its cause
+    of_program: Optional[BaseException]
+
     def __init__(self, scope: Scope) -> None:
         self._scope = scope
-        self.why: Optional[TrialEnd] = None  # None: it has not come
-        # sys.exit or Ctrl-C in a thread: the error of a Concurrence need not have it as its cause
-        self.of_program: Optional[BaseException] = None
-        self._is_stored = False
         self._is_going_down = False  # the process
         self._asking = 0  # questions that are open
         self._lock = threading.Lock()
+        self.begin_trial(is_stored=False)
 
     def begin_trial(self, is_stored: bool) -> None:
         """Begin a trial. `is_stored`: it has a store from which it can go on."""
@@ -46,7 +47,7 @@ class EarlyEnd:
 
     def is_near(self) -> bool:
         """Whether it has come, or may come at a shutdown, since a question is open."""
-        return self._asking > 0 or self.why is not None
+        return bool(self._asking or self.why)
 
     def note_end_of_state(self) -> None:
         """Note that a state has ended: next to an open question a shutdown may have ended it."""

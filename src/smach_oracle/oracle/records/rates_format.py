@@ -46,9 +46,7 @@ class Machines(Dict[str, Containers]):
         self.rules: Dict[str, object] = rules if isinstance(rules, dict) else {}
 
 
-def write_learned(
-    path: str, containers: Mapping[str, States], rule: Optional[FailureRule] = None
-) -> None:
+def write_learned(path: str, containers: Mapping[str, States], rule: Optional[FailureRule]) -> None:
     """Write what `learned_by` returned, in place of all that the file had.
 
     `rule`: by which failures were told, where that is known.
