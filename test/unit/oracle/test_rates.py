@@ -376,6 +376,8 @@ def test_the_record_of_a_trial_tells_how_to_go_on_after_it(tmp_path):
     rule = rule_in(watch.events[0].data)
     rates_format.write_learned(str(tmp_path / 'again.json'), learned, rule)
     assert (tmp_path / 'again.json').read_text() == path.read_text()
+    rates_format.write_learned(str(tmp_path / 'again.json'), learned, None)
+    assert 'failure_rules' not in json.loads((tmp_path / 'again.json').read_text())
     plain = watched(Scripted('aborted'))
     plain.machine.execute()
     assert 'learned' not in plain.events[-1].data, 'nothing is kept, so nothing is told'

@@ -202,6 +202,28 @@ def test_a_machine_without_a_name_hands_its_rates_to_each_that_has_a_state_of_it
     assert 'renamed' not in file_of(tmp_path), 'it is there for the others, too'
 
 
+def test_where_a_machine_without_a_name_has_learned_nothing_nothing_is_said(tmp_path, log):
+    path = tmp_path / 'rates.json'
+    settings = {'rates_file': str(path)}
+    Watched(chain_of(Scripted('aborted')), settings=settings).run()
+    gc.collect()
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(dict(content, machines={'': {}}, states={'': {'': ['A']}})))
+    assert Watched(chain_of(Scripted()), name='NEW', settings=settings).rate('A').failures == 0
+    assert not [text for _, text in log if 'is new there' in text]
+
+
+def test_rates_that_are_read_by_hand_stay_in_the_file_under_their_name_alone(tmp_path, log):
+    path = tmp_path / 'rates.json'
+    Watched(chain_of(Scripted('aborted')), name='OLD', settings={'rates_file': str(path)}).run()
+    gc.collect()
+    before = path.read_text()
+    reading = Watched(chain_of(Scripted()), name='NEW')
+    reading.machine.load_rates(str(path))
+    assert reading.rate('A').failures == 1
+    assert path.read_text() == before
+
+
 def test_one_that_has_its_name_back_goes_on_and_may_be_renamed_again(tmp_path, program):
     for name, wanted in (('OLD', (0, 0, 0)), ('NEW', (1, 1, 1)), ('OLD', (1, 1, 0))):
         with program(name, 1) as told:
