@@ -44,6 +44,15 @@ def test_rates_that_were_learned_by_another_rule_stay_and_that_is_told_once(tmp_
     assert len(said(log)) == 2, 'and a list is another rule again'
 
 
+def test_where_nothing_was_learned_no_rule_is_told_of(tmp_path, log):
+    path = tmp_path / 'rates.json'
+    run(path, failing_outcomes=['aborted'])
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(dict(content, containers={'': {}})))
+    run(path)
+    assert not said(log)
+
+
 def test_a_file_of_an_earlier_version_names_none_which_is_told_once_where_it_may_differ(
     tmp_path, log
 ):

@@ -213,6 +213,28 @@ def test_where_a_machine_without_a_name_has_learned_nothing_nothing_is_said(tmp_
     assert not [text for _, text in log if 'is new there' in text]
 
 
+def test_one_with_a_name_hands_its_rates_on_before_those_without(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    Watched(chain_of(Scripted('aborted', 'aborted')), name='OLD', settings=settings).run()
+    Watched(chain_of(Scripted('aborted'), Scripted('aborted')), settings=settings).run()
+    gc.collect()
+    content = file_of(tmp_path)
+    del content['failure_rules']  # as in a file of an earlier version
+    (tmp_path / 'rates.json').write_text(json.dumps(content))
+    assert Watched(chain_of(Scripted()), name='NEW', settings=settings).rate('A').failures == 2
+    assert 'failure_rules' not in file_of(tmp_path)
+
+
+def test_programs_that_know_no_names_get_the_rates_of_who_has_written_last(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    Watched(chain_of(Scripted(), Scripted()), name='B', settings=settings).run()
+    Watched(chain_of(Scripted('aborted')), name='A', settings=settings).run()
+    assert file_of(tmp_path)['containers'][''] == {
+        'A': file_of(tmp_path)['machines']['A']['']['A'],
+        'B': file_of(tmp_path)['machines']['B']['']['B'],
+    }
+
+
 def test_rates_that_are_read_by_hand_stay_in_the_file_under_their_name_alone(tmp_path, log):
     path = tmp_path / 'rates.json'
     Watched(chain_of(Scripted('aborted')), name='OLD', settings={'rates_file': str(path)}).run()
