@@ -36,7 +36,14 @@ def test_once_no_question_is_open_a_process_that_goes_down_ends_nothing_early():
         assert early_end.is_near()
     assert not early_end.is_near()
     early_end.note_shutdown()
+    early_end.note_end_of_state()
     assert early_end.why is None
     with early_end.asking():
         early_end.note_end_of_state()
     assert early_end.why is TrialEnd.SHUTDOWN and early_end.is_near()
+
+
+def test_a_stored_trial_ends_early_too_where_its_machines_hear_of_a_shutdown_first():
+    early_end = EarlyEnd(Scope(look=lambda: Reason.SHUTDOWN))
+    early_end.begin_trial(is_stored=True)
+    assert early_end.end_at_shutdown() and early_end.why is TrialEnd.SHUTDOWN

@@ -20,6 +20,8 @@ from smach_oracle.oracle.records.way_results import (
     counts_of_kinds,
     merged_ways,
     plain_failure_key,
+    results_in,
+    told_of,
 )
 from smach_oracle.oracle.settings.settings import StateSettings
 
@@ -256,6 +258,9 @@ def test_machines_that_share_a_rates_file_share_the_results(tmp_path):
         {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 -5']},
         {'names': [['again', 'again']], 'failures': ['x'], 'results': ['-1 0 0 1 1.0']},
         {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 1.0 nan']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 1.0 -0.1']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 1.0 1.1']},
+        {'names': [['again', 'again']], 'failures': ['x'], 'results': ['0 0 0 1 inf']},
         {'names': [['again', 'again']], 'failures': ['x'], 'results': [[0, 0, 0, True, 1.0]]},
     ],
 )
@@ -294,6 +299,11 @@ def filled(count, log=None):
         log.go(a_result(), lambda number=number: float(number))
         log.settle(True)
     return log
+
+
+def test_a_result_is_read_as_it_was_told():
+    told = [a_result(hoped=hoped, minutes=0.5) for hoped in (None, 0.0, 0.25, 1.0)]
+    assert results_in(told_of(told, 7)) == (told, 7)
 
 
 def test_the_latest_results_are_kept():
