@@ -5,7 +5,7 @@ import pytest
 import smach
 from smach_oracle.oracle import Answer, AnswerKind, Expert, OracleContainer
 from smach_oracle.oracle.checkpoint import checkpointer
-from smach_oracle.oracle.records.events import EventKind, OwnObserver
+from smach_oracle.oracle.records.events import EventKind, EventSource, OwnObserver
 from smach_oracle.store.state_command import main as oracle_state
 
 
@@ -19,6 +19,14 @@ def machine_of(runs, *labels, **settings):
                 {'ok': following},
             )
     return OracleContainer.wrap(machine, name='TOP', settings=settings)
+
+
+def test_what_is_told_before_the_first_trial_belongs_to_none():
+    seen, source = [], EventSource(print)
+    source.observers.append(seen.append)
+    assert source.last_seq == -1
+    source.emit(EventKind.WARNING, 'TOP')
+    assert [(event.trial_id, event.seq) for event in seen] == [('', 0)]
 
 
 class Cancelled(BaseException):

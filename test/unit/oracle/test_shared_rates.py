@@ -140,6 +140,13 @@ def test_what_could_not_be_written_is_written_later(tmp_path, monkeypatch, log):
     assert learned(path, 'TASK') == (3, 2)
 
 
+def test_no_folder_stays_open_for_a_rates_file(tmp_path):
+    one = machine(tmp_path / 'rates.json', 'TASK', ['aborted'])
+    before = len(os.listdir('/proc/self/fd'))
+    one.run()
+    assert len(os.listdir('/proc/self/fd')) == before
+
+
 def test_a_file_that_others_hold_stops_no_machine(tmp_path, monkeypatch, log):
     monkeypatch.setattr(lock_module, 'WAIT_S', 0.05)
     path = tmp_path / 'rates.json'

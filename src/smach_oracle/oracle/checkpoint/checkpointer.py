@@ -2,7 +2,19 @@
 
 import functools
 import time
-from typing import Callable, Dict, FrozenSet, Iterator, List, Optional, Sequence, Set, Tuple
+from typing import (
+    Callable,
+    Dict,
+    FrozenSet,
+    Iterator,
+    List,
+    Mapping,
+    Optional,
+    Sequence,
+    Set,
+    Tuple,
+    cast,
+)
 
 import smach
 from smach_common.foreign import ends_program, error_text
@@ -315,7 +327,8 @@ class Checkpointer:
 
         They are those around the failed state, whose container the machine may have left.
         """
-        path, _, label = str((jump.data or {}).get(JUMPED_FROM, '')).rpartition('/')
+        data = cast(Mapping[str, object], jump.data)  # each jump has some
+        path, _, label = str(data.get(JUMPED_FROM, '')).rpartition('/')
         failed = self._known_node(path, label) or node
         for each in (failed, *failed.around()):
             yield from self._facts_of(each).streaks()

@@ -275,11 +275,8 @@ class _Setting:
         self._resumption, self._nodes = resumption, nodes
         self._resumed = nodes[0].tree.resumed
 
-    def activate(self, node: TreeNode) -> bool:
-        """Set a container that was under way, and what is in its state.
-
-        :returns: whether a person is asked in it before anything moves, where that is wanted.
-        """
+    def activate(self, node: TreeNode) -> None:
+        """Set a container that was under way, and what is in its state."""
         stored = self._resumption.tree.container(node.key)
         key = '{}/{}'.format(node.key, stored.label)
         if stored.phase == IN and all(one.key != key for one in self._nodes):
@@ -288,10 +285,10 @@ class _Setting:
             moved = stored
         if moved.moved_to:
             self._go_on_elsewhere(node, moved)
-            return True
+            return
         if not node.has(stored.label):
             self._ask_at_beginning(node, stored, stored.label)
-            return True
+            return
         if node.site.is_container:
             self._resumed.enter_at(
                 node.records, EntryPoint(node, stored, self._way_down(node, stored))
@@ -304,7 +301,6 @@ class _Setting:
             self._go_on_in(node, stored, record)
         else:
             self.ask_at([TreePlace(node, stored.label)])
-        return True
 
     def _reopen(self, record: StateRecord, stored: StoredContainer) -> None:
         """Have the question about a state, if one was open, go on as the same one."""
@@ -358,7 +354,10 @@ class _Setting:
         )
 
     def set_container(self, node: TreeNode) -> bool:
-        """Set the machine, or a container in a state that was under way. See `activate`."""
+        """Set the machine, or a container in a state that was under way.
+
+        :returns: whether a person is asked in it before anything moves, where that is wanted.
+        """
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
             if stored.label in node.machine.get_registered_outcomes():
@@ -366,7 +365,7 @@ class _Setting:
                 return False
             self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
-            return self.activate(node)
+            self.activate(node)
         else:
             self._ask_before(node, initial_label_of(node.machine))
         return True

@@ -133,10 +133,8 @@ class EventSource:
     def __init__(self, log_error: Callable[[str], None]) -> None:
         self._log_error = log_error
         self._lock = threading.RLock()
-        self._seq = 0
         self.observers: List[Observer] = []
-        self.trial_id = ''
-        self._over = False  # the trial
+        self.begin_trial('')
         self._told: List[Observer] = []  # those that have failed, which the log has named
 
     def begin_trial(self, trial_id: str) -> None:
@@ -144,7 +142,7 @@ class EventSource:
         with self._lock:
             self.trial_id = trial_id
             self._seq = 0
-            self._over = False
+            self._over = False  # the trial
 
     @property
     def last_seq(self) -> int:

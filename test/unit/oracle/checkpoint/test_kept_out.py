@@ -87,7 +87,10 @@ def test_what_was_not_stored_is_missing_or_as_the_script_gives_it(tmp_path):
         if is_killed:
             assert killed.run(kill_at=6) is None
             assert killed.diary.count('begins')['A'] == 1
-        assert killed.run(states={'LOOK': {}})['outcome'] == ('succeeded')
+        told = killed.run(states={'LOOK': {}})
+        assert told['outcome'] == 'succeeded'
+        missing = [text for text in told['log'] if "userdata key 'file' is missing, as " in text]
+        assert len(missing) == is_killed
         assert list(killed.diary.count('finds')) == [found]
 
 

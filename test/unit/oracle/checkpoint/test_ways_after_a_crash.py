@@ -1,5 +1,6 @@
 """Killed as it tries one way after the other, a machine goes on with those that are left."""
 
+import contextlib
 import json
 import os
 import sqlite3
@@ -13,10 +14,13 @@ from machines import Scripted, Watched, chain_of
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.checkpoint.container_facts import ContainerFacts
+from smach_oracle.oracle.checkpoint.stored_tree import read_tree
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.recovery import options
+from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredFact, StoredValue
+from smach_oracle.store.store_file import StoreFile
 
 FAILURES = 4  # of PICK, in all processes together
 
@@ -183,6 +187,20 @@ def test_a_jump_stores_the_streaks_around_the_failed_state_and_looks_at_no_other
     assert machine.execute() == 'succeeded'
     assert [way for way, _ in stored] == ['again', 'wait 0.001 s', 'from /HOME']
     assert all(paths == {'TOP', 'TOP/GET'} for _, paths in stored), stored
+
+
+def test_a_way_that_ctrl_c_ends_is_stored_as_one_of_which_nobody_knows(tmp_path):
+    def stopped(state, ud):
+        raise KeyboardInterrupt
+
+    path = str(tmp_path / 'robot.db')
+    machine = chain_of(Scripted('aborted', stopped))
+    OracleContainer.wrap(machine, name='TOP', settings={'policy': 'escalating', 'checkpoint': path})
+    with pytest.raises(KeyboardInterrupt):
+        machine.execute()
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        stored = read_tree(store, 1, CODECS).container('TOP')
+    assert [row.split()[3] for row in stored.ways['A']['ways']['results']] == ['-']
 
 
 def test_a_state_that_was_interrupted_has_tried_nothing_yet(tmp_path):
