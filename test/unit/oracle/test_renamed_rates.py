@@ -199,6 +199,7 @@ def test_a_machine_without_a_name_hands_its_rates_to_each_that_has_a_state_of_it
     ]
     assert [each.rate('A').failures for each in alive] == [1, 1, 0]
     assert sum('is new there' in text for _, text in log) == 2
+    assert sum('with what machines without a name have learned' in text for _, text in log) == 2
     assert 'renamed' not in file_of(tmp_path), 'it is there for the others, too'
 
 

@@ -88,6 +88,16 @@ def test_another_file_gets_all_that_was_learned(tmp_path):
     assert (learned(first, 'TASK'), learned(second, 'TASK')) == ((1, 1), (2, 1))
 
 
+def test_another_file_gets_all_that_was_learned_also_where_others_have_come_first(tmp_path):
+    first, second = tmp_path / 'first.json', tmp_path / 'second.json'
+    task = machine(first, 'TASK', ['aborted'])
+    task.run()
+    OracleContainer.wrap(task.machine, name='TASK', settings={'rates_file': str(second)})
+    machine(second, 'TASK', ['aborted']).run()
+    task.run()
+    assert learned(second, 'TASK') == (3, 2)
+
+
 def test_a_machine_under_another_name_goes_on_with_what_was_learned(tmp_path):
     path = tmp_path / 'rates.json'
     machine(path, 'OLD', ['aborted', 'aborted']).run()
