@@ -224,7 +224,7 @@ def _of_containers(rng: random.Random, trial: Trial) -> Iterator[str]:
 
 
 def _facts_of(records: ContainerRecords, before: StoredContainer) -> ContainerFacts:
-    return ContainerFacts('T', records, {'A': 'never', 'B': 'allow', 'C': 'confirm'}.get, before)
+    return ContainerFacts('T', records, lambda label: 'never ' + label, before)
 
 
 # -- what is read

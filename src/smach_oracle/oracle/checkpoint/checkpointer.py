@@ -271,7 +271,7 @@ class Checkpointer:
             facts = self._facts[node.key] = ContainerFacts(
                 node.key,
                 node.records,
-                lambda label: node.settings_of(label).on_retry if node.has(label) else None,
+                lambda label: node.settings_of(label).on_retry,
                 self._before.container(node.key),
             )
         return facts

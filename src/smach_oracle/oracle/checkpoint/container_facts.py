@@ -53,10 +53,10 @@ class ContainerFacts:
         self,
         path: str,
         records: ContainerRecords,
-        on_retry: Callable[[str], Optional[str]],
+        on_retry: Callable[[str], str],
         before: StoredContainer,
     ) -> None:
-        """`on_retry`: that of a state, None where it is not there. `before`: what is stored."""
+        """`on_retry`: that of a state. `before`: what is stored."""
         self._path, self._records, self._on_retry = path, records, on_retry
         self._execution = before.execution  # number of the present one
         self._stored: Dict[str, str] = {}  # texts by name
@@ -108,9 +108,7 @@ class ContainerFacts:
         for label, mark in self._records.marks.told():
             if self._marks.get(label) != mark:
                 self._marks[label] = mark
-                on_retry = self._on_retry(label)
-                if on_retry is not None:
-                    yield fact_of(self._path, MARK + label, [*mark, on_retry])
+                yield fact_of(self._path, MARK + label, [*mark, self._on_retry(label)])
 
     def _new_visits(self, history: History) -> Iterator[Fact]:
         visits, total = history.visits, history.visits_of_execution
