@@ -333,9 +333,16 @@ def test_a_branch_that_cannot_be_preempted_is_named(log):
         def request_preempt(self):
             raise ValueError('mine')
 
-    refuses = Refuses(lambda state, ud: wait_for(lambda: 'raised' in str(log)) and 'ok')
+    begun = threading.Event()
+
+    def left(state, userdata):
+        begun.set()
+        return wait_for(lambda: 'raised' in str(log)) and 'ok'
+
+    # a state that has not begun raises in the container, as bare
+    other = Scripted(lambda state, userdata: begun.wait(10.0) and 'aborted')
     machine = Watched(
-        inside(both(refuses, Scripted('aborted'), child_termination_cb=lambda outcomes: True)),
+        inside(both(Refuses(left), other, child_termination_cb=lambda outcomes: True)),
         settings=ASKS,
     )
     machine.run()
