@@ -200,16 +200,18 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         stood.at = [way.first_label, BEFORE]
     elif stood.sent is not None:
         sent_to = stood.moved_to or stood.jumped_to
-        # none where it is gone, which is asked about below
         way = jump_path_to(top, place_named(top, sent_to[len(top.path) + 1 :] or stood.label))
     if way is not None:
         leave_unconfirmed(top, way.first_label)
     let_repeat(top, top.settings.resume_repeat, stood.sent)
+    setting = _Setting(resumption, nodes)
     if resumption.begins_at and way is not None:
         top.tree.resumed.enter_at(top.records, EntryPoint(top, stood, way.entered_places[1:]))
-        _Setting(resumption, nodes).ask_at(way.entered_places)
+        setting.ask_at(way.entered_places)
+    elif stood.sent is not None and way is None:  # where it was sent to is gone
+        setting.ask_at_beginning(top, stood, stood.jumped_to or stood.label)
     else:
-        _Setting(resumption, nodes).set_container(top)
+        setting.set_container(top)
 
 
 def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> int:
@@ -287,7 +289,7 @@ class _Setting:
             self._go_on_elsewhere(node, moved)
             return
         if not node.has(stored.label):
-            self._ask_at_beginning(node, stored, stored.label)
+            self.ask_at_beginning(node, stored, stored.label)
             return
         if node.site.is_container:
             self._resumed.enter_at(
@@ -363,7 +365,7 @@ class _Setting:
             if stored.label in node.machine.get_registered_outcomes():
                 self._resumed.had_ended(node.records, stored.label)
                 return False
-            self._ask_at_beginning(node, stored, 'outcome ' + stored.label)
+            self.ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
             self.activate(node)
         else:
@@ -377,7 +379,7 @@ class _Setting:
         way = jump_path_to(top, moved_to)
         # others may run next to it, which would be left
         if way is None or node.runs_beside_others():
-            self._ask_at_beginning(node, stored, stored.label)
+            self.ask_at_beginning(node, stored, stored.label)
             return
         stood = self._resumption.tree.container(top.key)
         stood.at, at = [way.first_label, BEFORE], stored.at_there
@@ -390,7 +392,7 @@ class _Setting:
         elif there.phase == FAILED or self._resumption.asks:
             self._resumed.go_on_with(record, self._unfinished(place.node, there))
 
-    def _ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
+    def ask_at_beginning(self, node: TreeNode, stored: StoredContainer, gone: str) -> None:
         """Have a person asked before a container begins that stood where it cannot go on."""
         labels, initial = list(node.labels()), initial_label_of(node.machine)
         if not labels:

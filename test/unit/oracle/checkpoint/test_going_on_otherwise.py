@@ -76,6 +76,17 @@ def test_a_person_is_asked_where_a_state_has_moved_to_where_no_oracle_is(tmp_pat
     assert after.diary.count('begins') == begun
 
 
+def test_a_person_is_asked_where_no_oracle_leads_to_the_state_any_more(tmp_path):
+    """The script is the same, and its settings leave the machine below to itself."""
+    killed_while_it_runs(tmp_path, nested_after, 'B')
+    after = KilledMachine(tmp_path, nested_after, tree={'nested': False}, on_resume='recover')
+    begun = after.diary.count('begins')
+    oracle_state(after, 'goto', 'IN/C')
+    told = after.run()
+    assert told.get('ended_by') == 'kept', told
+    assert after.diary.count('begins') == begun
+
+
 class Filled(smach.StateMachine):
     """Adds its states as it is executed."""
 
