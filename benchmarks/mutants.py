@@ -70,10 +70,9 @@ def main() -> int:
             reaches = list(itertools.chain.from_iterable(workshop.look()))
             try_all(workshop, mutants, reaches, trials)
             is_whole = True
-    except TestsNotRun as error:
-        sys.exit(str(error))
-    except KeyboardInterrupt:
-        print('interrupted: {} mutants were not tried'.format(len(mutants) - len(trials)))
+    except (TestsNotRun, KeyboardInterrupt) as error:
+        print(str(error) or 'interrupted')
+        print('{} mutants were not tried'.format(len(mutants) - len(trials)))
     if arguments.report:
         write_report(trials, arguments.report)
     status = summarise(trials)

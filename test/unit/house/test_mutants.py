@@ -7,6 +7,8 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
+from pathlib import Path
 
 import pytest
 from house import ROOT
@@ -139,6 +141,19 @@ import os, subprocess, sys
 
 ON_IMPORT = 11
 
+def made():
+    return 13
+
+MADE = made()
+ODD = [each for each in range(23) if each % 2]
+
+def checked(least, most):
+    def check(value):
+        return value > least and value < most
+    return check
+
+check = checked(100, 200)
+
 def at_least(a, b):
     return a >= b
 
@@ -182,7 +197,7 @@ class Below(Above):
         super().__init__()
 """
 TEST = """
-import m, pytest, threading
+import m, pytest, tempfile, threading
 
 def test_at_least():
     assert m.at_least(2, 1) and not m.at_least(1, 2)
@@ -209,7 +224,19 @@ def test_shared(made_once):
 def test_on_import():
     assert m.ON_IMPORT == 11
 
+def test_made():
+    assert m.MADE == 13 and m.made() == 13
+
+def test_odd():
+    assert len(m.ODD) == 11
+
+def test_check():
+    assert m.check(150) and not m.check(300)
+
+KEPT = []
+
 def test_below():
+    KEPT.append(tempfile.TemporaryDirectory())
     assert m.Below().made
 
 def test_waits():
@@ -235,6 +262,18 @@ def workshop(tmp_path, monkeypatch):
     return project, trying.Workshop(project, tmp_path, 1)
 
 
+def processes_of(folder):
+    """Those that have a folder in their environment."""
+    found = []
+    for path in Path('/proc').glob('[0-9]*/environ'):
+        try:
+            if str(folder).encode() in path.read_bytes():
+                found.append(path)
+        except OSError:
+            pass  # gone meanwhile, or somebody else's
+    return found
+
+
 def reaches_of(shop):
     """What its tests reach."""
     return list(itertools.chain.from_iterable(shop.look()))
@@ -249,6 +288,12 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
         '5': {'(5 + 1)': 'killed'},  # so does one that it forks
         '7': {'(7 + 1)': 'killed'},  # the second test sees what is made for the first one, too
         '11': {'(11 + 1)': 'killed'},  # it was taken as the module was imported
+        '13': {'(13 + 1)': 'killed'},  # so was this, by a function
+        'each % 2': {'(not (each % 2))': 'killed'},
+        'value > least and value < most': {
+            '((value > least))': 'killed',  # a closure that lives, and needs less
+            '((value > least) or (value < most))': 'killed',
+        },
         'super().__init__()': {'pass': 'killed'},  # the function is another closure without it
         'len(found) < to': {'len(found) >= to': 'killed'},
         'found.append(bytes(1 << 22))': {'pass': 'hung'},
@@ -258,6 +303,7 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
         mutant for mutant in project.mutants() if mutant.after in wanted.get(mutant.before, ())
     ]
     before = {path: path.read_text() for path in project.root.rglob('*.*')}
+    in_temporary = set(os.listdir(tempfile.gettempdir()))
     trials = list(shop.try_all(mutants, reaches_of(shop)))
     assert [(trial.mutant.before, trial.mutant.after, trial.verdict) for trial in trials] == [
         (each.before, each.after, wanted[each.before][each.after]) for each in mutants
@@ -266,10 +312,8 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
     seen_by = {trial.mutant.before: trial.by for trial in trials if trial.verdict == 'killed'}
     assert seen_by['7'] == CHECKS + '/test_m.py::test_shared'
     assert {path: path.read_text() for path in project.root.rglob('*.*')} == before
-    left = subprocess.run(
-        ['pgrep', '-f', str(project.root.parent)], stdout=subprocess.PIPE, check=False
-    ).stdout.decode()
-    assert left == '', 'a process of a test is left'
+    assert processes_of(project.root.parent) == []
+    assert set(os.listdir(tempfile.gettempdir())) == in_temporary, 'what a fork has made is left'
 
 
 def test_a_mutant_that_collects_without_end_has_the_memory_of_one_test(workshop):

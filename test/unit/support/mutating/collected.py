@@ -2,16 +2,16 @@
 
 import contextlib
 import json
-import os
+import shutil
 import socket
 import threading
 import time
 from pathlib import Path
 from typing import Callable, Dict, NamedTuple, Optional, Sequence, TextIO, Tuple
 
-from .forking import ASKED_BY
+from . import forking
 
-SUPPORT = Path(__file__).resolve().parents[1]  # has this package
+LIMIT_S = 600.0  # of collecting
 
 
 class TestsNotRun(Exception):
@@ -30,17 +30,20 @@ class Ending(NamedTuple):
 class Collected:
     """pytest, which has collected tests and forks for each run of some of them."""
 
-    def __init__(self, run_pytest: Callable[[Dict[str, str]], str], address: Path) -> None:
+    def __init__(self, run_pytest: Callable[[Dict[str, str]], str], folder: Path) -> None:
         """:param run_pytest: run it with the plugin `forking` and this environment, and return what
             it said in the end.
-        :param address: of a socket, to be made.
+        :param folder: of its own, to be made.
 
         :raises TestsNotRun: where it ends before it has collected.
         """
         self._said = ''
+        folder.mkdir()
+        shutil.copy(forking.__file__, str(folder))  # alone: the tests have helpers of their own
+        address = folder / 'asked'
 
         def run() -> None:
-            self._said = run_pytest({ASKED_BY: str(address), 'PYTHONPATH': str(SUPPORT)})
+            self._said = run_pytest({forking.ASKED_BY: str(address), 'PYTHONPATH': str(folder)})
 
         self._thread = threading.Thread(target=run)
         with socket.socket(socket.AF_UNIX) as listening:
@@ -49,15 +52,17 @@ class Collected:
             listening.settimeout(1.0)
             self._thread.start()
             self._connection, self._lines = self._accepted(listening)
-        os.remove(str(address))
 
     def _accepted(self, listening: socket.socket) -> Tuple[socket.socket, TextIO]:
+        deadline_s = time.monotonic() + LIMIT_S
         while True:
             try:
                 connection, _ = listening.accept()
             except socket.timeout:
                 if not self._thread.is_alive():
                     raise TestsNotRun(self._said) from None
+                if time.monotonic() > deadline_s:
+                    raise TestsNotRun('not collected after {:g} s'.format(LIMIT_S)) from None
             else:
                 connection.settimeout(None)
                 return connection, connection.makefile('rw')
@@ -65,8 +70,8 @@ class Collected:
     def run(self, module: Path, tests: Sequence[str], limit_s: float) -> Optional[Ending]:
         """Run tests with the change of a module that is on the disk.
 
-        :return: None where only a new process can: the module does other things on import, or a
-            test has another name.
+        :return: None where only a new process can: the change is in what ran on import, or a test
+            has another name.
         :raises TestsNotRun: where pytest is gone.
         """
         begun_s = time.monotonic()

@@ -142,10 +142,10 @@ class Copy:
 
     def run_changed(self, module: Path, tests: Sequence[str], limit_s: float) -> Ending:
         """Run tests with the change of a module that is on the disk, as `run` does, and quickly
-        where the change is within functions.
+        where the change is in functions that have not run on import.
         """
         if self._collected is None:
-            self._collected = Collected(self._collect, self._beside('asked'))
+            self._collected = Collected(self._collect, self._beside('collected'))
         ending = self._collected.run(module, tests, limit_s)
         if ending is not None:
             return ending
@@ -158,7 +158,12 @@ class Copy:
     def _collect(self, env: Dict[str, str]) -> str:
         """Hold the tests for `_collected`. Return what went wrong in the end."""
         log = self.folder / 'collected.log'
-        problem = self._pytest(['-p', 'mutating.forking', self._tests], log, math.inf, env)
+        problem = self._pytest(
+            ['-p', 'forking', '--basetemp', str(self._beside('temporary')), self._tests],
+            log,
+            math.inf,
+            env,
+        )
         return '{}\n{}'.format(problem, _end_of(log))
 
     def close(self) -> None:

@@ -1,10 +1,10 @@
 """A plugin for pytest: it collects the tests once, and runs those that it is asked for in a child
 that is forked each time, with the change of a module that lies on the disk then.
 
-Who asks listens on the socket of $ASKED_BY. A line of JSON has the `module` that has changed, the
-`tests`, and `limit_s`, the time they have. The answer is a line, too: `is_taken`, false where the
-change is in what runs as the module is imported, or a test has another name; then `is_fine`,
-`is_hung`, and `by`, the test that has failed.
+The one that asks listens on the socket of $ASKED_BY. A line of JSON has the `module` that has
+changed, the `tests`, and `limit_s`, the time they have. The answer is a line, too. `is_taken` is
+false where the change is in what has run already, as the tests were collected, or where a test has
+another name. `is_fine`, `is_hung` and `by`, the test that has failed, follow where it is true.
 """
 
 import ctypes
@@ -17,8 +17,10 @@ import select
 import signal
 import socket
 import sys
-from types import CodeType, FunctionType
-from typing import Any, Dict, Iterator, List, Sequence, Tuple
+import tempfile
+import time
+from types import CodeType, FrameType, FunctionType
+from typing import Any, Dict, Iterator, List, Sequence, Set, Tuple
 
 import pytest
 
@@ -26,16 +28,35 @@ ASKED_BY = 'MUTANTS_ASKED_BY'
 PR_SET_CHILD_SUBREAPER = 36  # linux/prctl.h
 FUNCTION = 0x2  # CO_NEWLOCALS of `inspect`: the code of a class has none
 FINE = b'fine\n'
+GRACE_S = 5.0  # in which a child removes its files
 
 Change = Tuple[CodeType, CodeType]  # of a function, before and after
 
+HERE = os.getcwd()
+has_run: Set[CodeType] = set()  # as the tests were collected
 
-class ImportedChange(Exception):
-    """Code differs that has run already, as its module was imported."""
+
+class ChangeRan(Exception):
+    """Code differs that has run already."""
+
+
+def _note(frame: FrameType, event: str, _: object) -> None:
+    if event == 'call' and frame.f_code.co_filename.startswith(HERE):
+        has_run.add(frame.f_code)
+
+
+sys.setprofile(_note)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """All is imported."""
+    sys.setprofile(None)
 
 
 def pytest_runtestloop(session: pytest.Session) -> bool:
     """Answer until nobody asks any more."""
+    if session.testsfailed:
+        raise session.Interrupted('a file of tests was not collected')
     with socket.socket(socket.AF_UNIX) as asking:
         asking.connect(os.environ[ASKED_BY])
         forks = Forks(session)
@@ -56,7 +77,7 @@ class Forks:
             self._tests.setdefault(each.nodeid.split('::')[0], []).append(each)
         self._codes: Dict[str, CodeType] = {}
         for path in {getattr(each, '__file__', None) for each in list(sys.modules.values())}:
-            if path and path.endswith('.py') and path.startswith(os.getcwd()):
+            if path and path.endswith('.py') and path.startswith(HERE):
                 with open(path, encoding='utf-8') as file:
                     self._codes[path] = compile(file.read(), path, 'exec')
         found = gc.get_objects()
@@ -65,6 +86,7 @@ class Forks:
         for each in found:
             if isinstance(each, FunctionType) and each.__code__.co_filename in self._codes:
                 self._functions.setdefault(each.__code__, []).append(each)
+        gc.freeze()  # a child finds new objects alone
         # whatever a child leaves is this process's child then
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
 
@@ -72,30 +94,44 @@ class Forks:
         """Run tests with the change that is on the disk."""
         try:
             changes = self._changes(module)
-            chosen = list(itertools.chain.from_iterable(self._tests[name] for name in tests))
-        except (ImportedChange, KeyError):
+            named = itertools.chain.from_iterable(self._tests[name] for name in tests)
+            chosen = list(dict.fromkeys(named))
+        except (ChangeRan, KeyError):
             return {'is_taken': False}
         reading, writing = os.pipe()
-        if not os.fork():
-            try:
-                os.setsid()
-                os.close(reading)
-                os.write(writing, self._failed(chosen, changes) or FINE)
-            finally:
-                os._exit(0)
+        child = os.fork()
+        if not child:
+            os.close(reading)
+            self._run_in_child(chosen, changes, writing)
         os.close(writing)
         try:
             in_time = bool(select.select([reading], [], [], limit_s)[0])
             told = os.read(reading, 1 << 16) if in_time else b''
         finally:
             os.close(reading)
-            _kill_children()
+            _end(child, in_time)
         return {
             'is_taken': True,
             'is_fine': told == FINE,
             'is_hung': not in_time,
             'by': '' if told == FINE else told.decode(),
         }
+
+    def _run_in_child(self, tests: List[pytest.Item], changes: List[Change], writing: int) -> None:
+        """Run tests, and end the process."""
+        child = 0
+        try:
+            os.setsid()
+            child = os.getpid()
+            told = self._failed(tests, changes) or FINE
+            if os.getpid() == child:  # else a test has forked, and its child came here
+                os.write(writing, told)
+        finally:
+            try:
+                if os.getpid() == child:
+                    _remove_folders()
+            finally:
+                os._exit(0)
 
     def _failed(self, tests: List[pytest.Item], changes: List[Change]) -> bytes:
         """Change the functions, and return the name of the first test that fails."""
@@ -110,13 +146,15 @@ class Forks:
         for test, following in zip(tests, [*tests[1:], None]):
             test.ihook.pytest_runtest_protocol(item=test, nextitem=following)
             if self._session.testsfailed:
+                # what the others would have shared is torn down
+                test.ihook.pytest_runtest_teardown(item=test, nextitem=None)
                 return test.nodeid.encode()
         return b''
 
     def _changes(self, module: str) -> List[Change]:
-        """:raises ImportedChange: where more differs than what functions do."""
+        """:raises ChangeRan: where the change is in what has run already."""
         if module not in self._codes:
-            raise ImportedChange
+            raise ChangeRan
         with open(module, encoding='utf-8') as file:
             return list(_in_imported(self._codes[module], compile(file.read(), module, 'exec')))
 
@@ -124,22 +162,30 @@ class Forks:
 def _in_imported(before: CodeType, after: CodeType) -> Iterator[Change]:
     """Yield the functions of a module or of a class in it."""
     if _done_by(before) != _done_by(after):
-        raise ImportedChange
+        raise ChangeRan
     for one, other in zip(_codes_in(before), _codes_in(after)):
         if not one.co_flags & FUNCTION:
             yield from _in_imported(one, other)
-        elif one.co_freevars == other.co_freevars:
+        elif not (one in has_run and _is_changed(one, other)):
             yield from _in_function(one, other)
-        else:  # it needs another closure, as where it calls super() no more
-            raise ImportedChange
+        else:
+            raise ChangeRan
 
 
 def _in_function(before: CodeType, after: CodeType) -> Iterator[Change]:
-    """Yield a function, and those in it, which may live already: what a decorator has made."""
+    """Yield a function, and those in it, of which some may live already."""
+    if before.co_freevars != after.co_freevars:  # it needs another closure
+        raise ChangeRan
     yield before, after
     for one, other in zip(_codes_in(before), _codes_in(after)):
         if one.co_name == other.co_name and one.co_freevars == other.co_freevars:
             yield from _in_function(one, other)
+
+
+def _is_changed(before: CodeType, after: CodeType) -> bool:
+    """Whether a function does something else, or one in it."""
+    inner = list(zip(_codes_in(before), _codes_in(after)))
+    return _done_by(before) != _done_by(after) or any(itertools.starmap(_is_changed, inner))
 
 
 def _codes_in(code: CodeType) -> List[CodeType]:
@@ -149,11 +195,29 @@ def _codes_in(code: CodeType) -> List[CodeType]:
 def _done_by(code: CodeType) -> Tuple[Any, ...]:
     """Return what code does, whatever its functions do and the numbers of its lines are."""
     constants = [each.co_name if isinstance(each, CodeType) else each for each in code.co_consts]
-    return code.co_code, code.co_names, list(map(repr, constants))
+    return (
+        code.co_code,
+        code.co_names,
+        code.co_varnames,
+        code.co_freevars,
+        list(map(repr, constants)),
+    )
 
 
-def _kill_children() -> None:
-    """Kill the children, and what they leave, until none is left."""
+def _remove_folders() -> None:
+    """Remove what the tests of a child keep until their process ends."""
+    for each in gc.get_objects():
+        if issubclass(type(each), tempfile.TemporaryDirectory):
+            each.cleanup()
+
+
+def _end(child: int, in_time: bool) -> None:
+    """Let a child end, and kill what is left then, and what that leaves, until none is left."""
+    if not in_time:
+        os.kill(child, signal.SIGINT)
+    deadline_s = time.monotonic() + GRACE_S
+    while time.monotonic() < deadline_s and os.waitpid(child, os.WNOHANG) == (0, 0):
+        time.sleep(0.005)
     children = '/proc/self/task/{}/children'.format(os.getpid())
     while True:
         with open(children, encoding='ascii') as file:
