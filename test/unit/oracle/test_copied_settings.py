@@ -3,6 +3,7 @@
 import copy
 import pickle
 
+import pytest
 from forked import Fork
 from machines import Scripted, Watched, chain_of
 
@@ -96,7 +97,8 @@ def test_a_machine_that_was_pickled_in_another_process_is_this_ones():
         fork.end_with(pickled)
     fork.wait()
     made = fork.answer()
-    if made is not None:
-        machine = pickle.loads(made)
-        assert not oracle_of(machine).is_parents
-        assert machine.execute() == 'done' and machine.rates()[0].successes == 1
+    if made is None:
+        pytest.skip('this engine cannot pickle machines')
+    machine = pickle.loads(made)
+    assert not oracle_of(machine).is_parents
+    assert machine.execute() == 'done' and machine.rates()[0].successes == 1

@@ -173,7 +173,8 @@ def test_a_state_that_is_given_as_a_precondition_is_held_by_a_pause_alone(autono
         held.hand.confirm() if autonomy == 'confirm' else held.hand.resume()
         assert held.end() == 'done'
     by = [event.by for event in held.of(EventKind.HOLD_START)]
-    assert by == (['', ''] if autonomy == 'confirm' else [held.of(EventKind.HOLD_START)[0].by])
+    assert len(by) == (2 if autonomy == 'confirm' else 1)
+    assert autonomy == 'run' or by == ['', '']  # no person has held it
 
 
 def holds_of(held):

@@ -180,7 +180,7 @@ def test_a_streak_ends_with_the_execution_of_its_container():
     assert orders(machine) == ['again', 'again']
 
 
-def test_the_next_trial_begins_a_streak_that_a_way_had_left_anew():
+def test_a_streak_that_a_way_had_left_begins_again_in_the_next_trial():
     def stop(state, ud):
         machine.machine.request_preempt()
         state.service_preempt()

@@ -173,7 +173,7 @@ def test_a_question_about_another_state_is_not_taken_up(tmp_path):
     assert killed.run()['outcome'] == 'succeeded', 'it goes on with CARRY, and asks nobody'
 
 
-def test_from_an_earlier_moment_a_question_is_put_anew(tmp_path):
+def test_from_an_earlier_moment_a_new_question_is_put(tmp_path):
     """It may have been answered since."""
     killed = KilledMachine(tmp_path, flat, max_recoveries=0)
     killed.run(expert=Answers(tmp_path / 'asked', lambda *_: os.kill(os.getpid(), 9)))
