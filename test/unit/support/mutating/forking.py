@@ -7,6 +7,7 @@ false where the change is in what has run already, as the tests were collected, 
 another name. `is_fine`, `is_hung` and `by`, the test that has failed, follow where it is true.
 """
 
+import contextlib
 import ctypes
 import functools
 import gc
@@ -146,8 +147,9 @@ class Forks:
         for test, following in zip(tests, [*tests[1:], None]):
             test.ihook.pytest_runtest_protocol(item=test, nextitem=following)
             if self._session.testsfailed:
-                # what the others would have shared is torn down
-                test.ihook.pytest_runtest_teardown(item=test, nextitem=None)
+                with contextlib.suppress(Exception):  # of plugins, which have done theirs already
+                    # what the others would have shared is torn down
+                    test.ihook.pytest_runtest_teardown(item=test, nextitem=None)
                 return test.nodeid.encode()
         return b''
 

@@ -140,7 +140,7 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
             took_s += run_s
             path.write_text(original, 'utf-8')
             # tests that were never together before may disturb each other
-            if verdict and not _verdict_of(copy, path, run)[0]:
+            if verdict and not _verdict_of(copy, path, _up_to(by, run))[0]:
                 return Trial(mutant, verdict, by, len(tests), took_s)
     finally:
         path.write_text(original, 'utf-8')
@@ -160,6 +160,12 @@ def _in_runs(tests: List[Reach]) -> Iterator[List[Reach]]:
         # those of a file one after the other, for what they share
         yield sorted(each for _, each in ranked[begin : begin + size])
         begin, size = begin + size, size * FEW
+
+
+def _up_to(last: str, tests: List[Reach]) -> List[Reach]:
+    """Return the tests that ran before one, and that one; all of them where it is none of them."""
+    named = [each.test for each in tests]
+    return tests[: named.index(last) + 1] if last in named else tests
 
 
 def _verdict_of(copy: Copy, module: Path, tests: Sequence[Reach]) -> Tuple[str, str, float]:
