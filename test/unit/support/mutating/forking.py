@@ -219,7 +219,7 @@ def _end(child: int, in_time: bool) -> None:
         os.kill(child, signal.SIGINT)
     deadline_s = time.monotonic() + GRACE_S
     while time.monotonic() < deadline_s and os.waitpid(child, os.WNOHANG) == (0, 0):
-        time.sleep(0.005)
+        time.sleep(0.005)  # the system has no wait for a child with a limit
     children = '/proc/self/task/{}/children'.format(os.getpid())
     while True:
         with open(children, encoding='ascii') as file:
