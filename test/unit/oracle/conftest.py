@@ -3,6 +3,7 @@
 import os
 import sys
 import tempfile
+import threading
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,14 @@ def clock(monkeypatch):
     clock = FakeClock()
     monkeypatch.setattr(tree, 'Clock', lambda: clock)
     return clock
+
+
+@pytest.fixture
+def quiet_threads(monkeypatch):
+    """Upstream's Concurrence lets its threads raise. The shutdown check is put back, too."""
+    monkeypatch.setattr(threading, 'excepthook', lambda *said: None)
+    yield
+    smach.set_shutdown_check(lambda: False)
 
 
 @pytest.fixture

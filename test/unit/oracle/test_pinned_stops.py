@@ -4,24 +4,14 @@
 (test/data/pinned/README.md).
 """
 
-import threading
-
 import pinned_stops
 import pytest
 from pinned import held
 from pinned_trees import digests, name_of
 
-import smach
+pytestmark = pytest.mark.usefixtures('quiet_threads')
 
 PINNED = dict(line.split(' ', 1) for line in held('stops'))
-
-
-@pytest.fixture(autouse=True)
-def quiet(monkeypatch):
-    """Upstream's Concurrence lets its threads raise."""
-    monkeypatch.setattr(threading, 'excepthook', lambda *said: None)
-    yield
-    smach.set_shutdown_check(lambda: False)
 
 
 @pytest.mark.parametrize('part', range(4))

@@ -5,23 +5,13 @@ A change of the inside leaves it alone. Where users are meant to see one,
 (test/data/pinned/README.md).
 """
 
-import threading
-
 import pinned_trees
 import pytest
 from pinned import held
 
-import smach
+pytestmark = pytest.mark.usefixtures('quiet_threads')
 
 PINNED = dict(line.split(' ', 1) for line in held('trees'))
-
-
-@pytest.fixture(autouse=True)
-def quiet(monkeypatch):
-    """Upstream's Concurrence lets its threads raise."""
-    monkeypatch.setattr(threading, 'excepthook', lambda *said: None)
-    yield
-    smach.set_shutdown_check(lambda: False)
 
 
 @pytest.mark.parametrize('first', range(0, pinned_trees.TREES, 20))

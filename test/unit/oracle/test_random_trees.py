@@ -1,25 +1,16 @@
 """Random trees: the executive goes as a model goes that is written apart from it."""
 
 import os
-import threading
 
 import pytest
 from tree_model.comparing import compare, difference_of
 from tree_model.disturbing import disturb
 from tree_model.drawing import ANY, UPSTREAM, draw
 
-import smach
+pytestmark = pytest.mark.usefixtures('quiet_threads')
 
 IS_UPSTREAM = bool(os.environ.get('SMACH_UPSTREAM'))
 SHAPE = UPSTREAM if IS_UPSTREAM else ANY
-
-
-@pytest.fixture(autouse=True)
-def quiet(monkeypatch):
-    """Upstream's Concurrence lets its threads raise."""
-    monkeypatch.setattr(threading, 'excepthook', lambda *said: None)
-    yield
-    smach.set_shutdown_check(lambda: False)
 
 
 @pytest.mark.parametrize('first', range(0, 200, 20))

@@ -203,16 +203,27 @@ class FailsThenRuns(Waits):
         return super().execute(userdata)
 
 
-def test_a_question_about_a_state_that_still_runs_is_open_again(tmp_path):
+def a_long(state):
+    """A builder of a machine with such a state."""
+
     def build(diary, points):
         machine = smach.StateMachine(['succeeded', 'aborted', 'preempted'])
         machine.userdata.done = []
         with machine:
-            machine.add('LONG', FailsThenRuns(diary), {'aborted': 'aborted'})
+            machine.add('LONG', state(diary), {'aborted': 'aborted'})
         return machine
 
+    return build
+
+
+def test_a_question_about_a_state_that_still_runs_is_open_again(tmp_path):
     task = Task(
-        tmp_path, build, 'guard', max_recoveries=3, still_running_s=0.05, still_running_factor=1
+        tmp_path,
+        a_long(FailsThenRuns),
+        'guard',
+        max_recoveries=3,
+        still_running_s=0.05,
+        still_running_factor=1,
     )
     told = task.goes_down()
     assert (told['outcome'], told['ended_by']) == (None, 'shutdown')
@@ -235,14 +246,13 @@ class EndsLater(FailsThenRuns):
 
 
 def test_a_state_that_ends_after_its_question_is_in_doubt(tmp_path):
-    def build(diary, points):
-        machine = smach.StateMachine(['succeeded', 'aborted', 'preempted'])
-        machine.userdata.done = []
-        with machine:
-            machine.add('LONG', EndsLater(diary), {'aborted': 'aborted'})
-        return machine
-
-    task = Task(tmp_path, build, max_recoveries=3, still_running_s=0.05, still_running_factor=1)
+    task = Task(
+        tmp_path,
+        a_long(EndsLater),
+        max_recoveries=3,
+        still_running_s=0.05,
+        still_running_factor=1,
+    )
     told = task.goes_down()
     assert (told['outcome'], told['ended_by']) == (None, 'shutdown')
     assert task.goes_on()['outcome'] == 'succeeded'
