@@ -110,14 +110,18 @@ class Told(Executed):
         """Add a line."""
         self.lines.append('{} {}'.format(what, written(value)).rstrip())
 
-    def run(self, trials: int) -> None:
-        """Execute it as often, and tell what is known of it then.
+    def now(self) -> float:
+        """The time by which states take as long as they do.
 
-        No state takes any time: who is slow on a busy computer would be a dearer way.
+        None takes any: who is slow on a busy computer would be a dearer way.
         """
+        return 0.0
+
+    def run(self, trials: int) -> None:
+        """Execute it as often, and tell what is known of it then."""
         with contextlib.ExitStack() as stack:
             stack.enter_context(logged(self.tell, self.LOGS_TRANSITIONS))
-            stack.enter_context(mock.patch.object(visiting, 'monotonic', lambda: 0.0))
+            stack.enter_context(mock.patch.object(visiting, 'monotonic', self.now))
             # nothing settles while a command waits, which comes in the thread of the machine
             stack.enter_context(mock.patch.object(control, '_SETTLE_S', 0.001))
             for _ in range(trials):
