@@ -77,15 +77,10 @@ def levels_above(node: TreeNode) -> Iterator[TreeNode]:
     child, above = node, node.parent
     while above is not None and is_executing(above.machine):
         state = states_of(above.machine).get(child.labels_from_parent[0])
-        if state is None or current_state_of(above.machine) is not state:
+        if current_state_of(above.machine) is not state:
             return
         yield above
         child, above = above, above.parent
-
-
-def is_direct(node: TreeNode) -> bool:
-    """Whether nothing lies between a container and the wrapped one above it."""
-    return node.parent is not None and not node.runs_in_branch
 
 
 def nodes_of_tree(node: TreeNode) -> Iterator[TreeNode]:
@@ -106,7 +101,7 @@ def direct_levels(node: TreeNode, at_rest: bool = False) -> List[TreeNode]:
     """
     levels = [node]
     for above in node.around() if at_rest else levels_above(node):
-        if is_direct(levels[-1]):
+        if not levels[-1].runs_in_branch:
             levels.append(above)
     return levels
 

@@ -14,7 +14,6 @@ from ..machine.places import (
     TreePlace,
     direct_levels,
     failure_context,
-    is_direct,
     jump_path_to,
     levels_above,
     links_to,
@@ -25,7 +24,6 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY, Decider
 from ..smach_private import (
     current_label_of,
-    current_state_of,
     is_executing,
     loop_outcomes_of,
     states_of,
@@ -68,7 +66,7 @@ def foreseen_above(
         above = node.parent
         if above is not next(levels_above(node), None):
             return None
-        if not is_direct(node):
+        if node.runs_in_branch:
             return (
                 Foreseen('{} {} -> the next item'.format(node.path, outcome), outcome)
                 if _is_item_passed_over(node, above, outcome)
@@ -76,7 +74,7 @@ def foreseen_above(
             )
         label = node.labels_from_parent[0]
         route, kind = judged_at(above, label, outcome)
-        if kind is FailureKind.NOT_A_FAILURE or not route.target:
+        if kind is FailureKind.NOT_A_FAILURE:
             return None
         if author_recovers(outcome, route, kind, above.settings_of(label)):
             return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))
@@ -121,16 +119,12 @@ def _failure_above(
 
 def runs_as_precondition(node: TreeNode) -> bool:
     """Whether a container is executed as a precondition, while a level above recovers."""
-    child, above = node, node.parent
-    while above is not None:
+    for child, above in zip((node, *levels_above(node)), node.around()):
         state = states_of(above.machine).get(child.labels_from_parent[0])
         if above.tree.is_precondition(above, state):
             return True
         if is_executing(above.machine) and above.is_oracle(current_label_of(above.machine)):
             return True
-        if not is_executing(above.machine) or current_state_of(above.machine) is not state:
-            return False
-        child, above = above, above.parent
     return False
 
 
@@ -192,15 +186,12 @@ def _decide_above(
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
-    way = (
-        jump_path_to(below, above.jump_path.entered_places[-1])
-        if above.jump_path is not None
-        else None
-    )
+    place = None if above.jump_path is None else above.jump_path.entered_places[-1]
+    way = jump_path_to(below, place)
     if recovery.is_over():  # by a preempt while its preconditions ran
         record.take_back_failure()
         return None
-    if above.jump_path is None or way is None:
+    if way is None:
         record.take_back_failure()
         recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
         return None
@@ -208,7 +199,7 @@ def _decide_above(
     tell_failure(level, record, failure, continuous, reading)
     sentence = tell_decision(above, decided)
     record.recoveries += 1
-    kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
+    kept, restarts = way.kept(above.watch), facts.action is Action.RESTART
     jump = JumpTo(way, '', sentence, kept, level, restarts, above.chosen)
     return jump, facts.wait_s
 
