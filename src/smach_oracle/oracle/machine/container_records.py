@@ -24,7 +24,7 @@ class ContainerSettings:
     They are those of the whole machine, those given with `add()`, and what follows from them.
     """
 
-    def __init__(self, settings: Settings, name: str = '') -> None:
+    def __init__(self, settings: Settings, name: str) -> None:
         self.name = name  # '' where nobody has given it one
         self.given_with_add: Dict[str, Dict[str, Any]] = {}  # by label
         self.strict: Strictness = True

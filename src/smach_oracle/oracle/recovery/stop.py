@@ -26,7 +26,7 @@ def note_end_under_preempt(node: TreeNode, label: str, outcome: Optional[str]) -
 
     :param outcome: the outcome as its author drew it, None for a failure.
     """
-    is_drawn = outcome is not None and is_preempted(outcome)
+    is_drawn = is_preempted(outcome)
     if is_drawn:
         node.records.note_drawn()
     if outcome is None or is_drawn or not states_of(node.machine)[label].preempt_requested():
