@@ -472,3 +472,17 @@ def test_a_loop_over_several_states_is_reported():
     )
     machine.run()
     assert {event.state for event in machine.of(EventKind.WARNING)} == {'A', 'B'}
+
+
+def test_a_state_with_the_name_of_a_failure_is_no_end_that_reports_one():
+    machine = Watched(
+        made(
+            [
+                ('WORK', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'REPORT'}),
+                ('REPORT', Scripted(outcomes=('succeeded',)), {'succeeded': 'aborted'}),
+                ('aborted', Scripted(outcomes=('ok',)), {'ok': 'done'}),
+            ]
+        )
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['WORK', 'REPORT', 'aborted'] and machine.decisions() == []

@@ -6,7 +6,7 @@ import signal
 from typing import Any, List
 
 import pytest
-from machines import Scripted, Watched
+from machines import Scripted, Watched, chain_of
 from waiting import wait_for
 
 import smach
@@ -121,3 +121,13 @@ def test_a_state_that_was_exchanged_while_an_iterator_executes_stays() -> None:
         smach.Iterator.set_contained_state('EACH', Scripted(exchange), loop_outcomes=['ok'])
     assert OracleContainer.wrap(machine_of(iterator)).execute() == 'done'
     assert iterated_state_of(iterator) is other and iterator._items is items
+
+
+def test_a_way_that_was_taken_from_the_oracle_is_drawn_again() -> None:
+    state = Scripted('aborted', 'ok', 'aborted')
+    machine = Watched(chain_of(state))
+    assert machine.run() == 'done'
+    ways = machine.machine._transitions
+    del ways['ORACLE']['A']
+    assert machine.run() == 'done' and state.runs == 4
+    assert ways['ORACLE']['A'] == 'A'

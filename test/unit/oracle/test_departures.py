@@ -150,3 +150,25 @@ def test_a_container_that_is_left_ends_with_the_outcome_that_says_least(outcomes
     machine = Watched(top, name='TOP', expert=FakeExpert(answers), settings={'max_recoveries': 0})
     assert machine.run() == 'done'
     assert told == [left_with, 'done']
+
+
+def test_a_container_that_raises_as_it_is_left_counts_as_left():
+    ends = [ValueError('odd'), 'done']
+
+    def outcome_of(outcomes):
+        end = ends.pop(0)
+        if isinstance(end, str):
+            return end
+        raise end
+
+    beside = smach.Concurrence(['done', 'aborted'], 'aborted', outcome_cb=outcome_of)
+    with beside:
+        smach.Concurrence.add('ARM', chain(GRASP=Scripted('aborted')))
+    machine = chain(A=Scripted(), BESIDE=beside)
+    expert = FakeExpert(goto('A', container='TOP'))
+    watched = Watched(machine, name='TOP', expert=expert, settings={'max_recoveries': 0})
+    assert watched.run() == 'done'
+    counted = {
+        (row.state, row.outcome, row.to): row.count for row in watched.machine.transition_counts()
+    }
+    assert counted['BESIDE', 'left', 'ORACLE'] == 1

@@ -35,6 +35,12 @@ def test_an_exception_is_recovered_from():
     assert machine.of(EventKind.FAILURE)[0].text == 'ValueError: no grasp'
 
 
+def test_what_a_state_has_raised_is_logged_with_its_traceback(log):
+    assert watched(Scripted(ValueError('no grasp'))).run() == 'done'
+    (told,) = [text for _, text in log if text.startswith('SM_ROOT/A failed: ')]
+    assert 'in execute' in told and told.rstrip().endswith('ValueError: no grasp')
+
+
 def test_where_nothing_more_can_be_said_of_a_failure_the_log_says_why(log):
     machine = watched(Scripted('aborted'))
 

@@ -216,6 +216,19 @@ def test_a_transition_into_a_state_whose_thread_lives_fails_at_once(clock):
     state.leave()
 
 
+def test_a_decision_says_which_state_still_runs_that_it_would_go_back_to(clock):
+    state = Stubborn()
+    clock.end(2, state.stuck)
+    machine = Watched(
+        chain_of(state, Scripted('aborted')),
+        expert=FakeExpert(goto('B'), supersede('ok')),
+        settings={'policy': 'algorithm1', 'states': {'A': ABANDONING}},
+    )
+    assert machine.run() == 'done'
+    assert 'A still runs since it overran' in machine.of(EventKind.DECISION)[-1].text
+    state.leave()
+
+
 def test_it_is_blocked_under_its_other_label_and_as_a_precondition_too(clock):
     state = Stubborn()
     clock.end(2, state.stuck)

@@ -46,3 +46,9 @@ def test_killed_anywhere_the_failed_state_is_recovered_from(tmp_path):
         assert begun['WORK'] <= 3 and begun['REPORT'] <= 2, (point, begun)
         told_once += has_told and begun['REPORT'] == 1
     assert told_once >= 3, 'at the transition to the oracle, its decision and its jump'
+
+
+def test_after_a_crash_it_is_recovered_from_by_a_policy_that_learns_as_well(tmp_path):
+    left = Left(reporting, policy='learned')
+    told = left.killed_at(left.first_in('REPORT'), tmp_path / 'killed').run()
+    assert told.get('outcome') == 'succeeded', told

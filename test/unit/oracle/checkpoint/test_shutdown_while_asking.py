@@ -11,6 +11,7 @@ from waiting import wait_for
 import smach
 from smach_oracle.oracle import Expert, oracle_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
+from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.store.store_file import StoreFile
 
 ASKS = {'max_recoveries': 0}
@@ -191,6 +192,26 @@ def test_a_branch_that_runs_beside_the_question_is_in_doubt(tmp_path, how, is_ma
     assert not task.killed.diary.count('begins')['HOME']
     of_asks = [each for each, state in task.questions() if state != 'RUNS']
     assert of_asks[0] == of_asks[1]
+
+
+def test_what_waits_for_an_operator_beside_the_question_is_left_behind(tmp_path):
+    def build(diary, points):
+        both = smach.Concurrence(['succeeded', 'aborted'], 'aborted')
+        with both:
+            both.add('ASKS', Noted('ASKS', diary, points, failures=1))
+            both.add('HELD', Noted('HELD', diary, points))
+        return around('BOTH', both, {'succeeded': 'succeeded'})
+
+    def once_held(question, cancelled):
+        hand = OperatorHand(task._machines[0])
+        assert wait_for(lambda: any(each.held_by for each in hand.status().active))
+        go_down(question, cancelled)
+
+    task = Task(tmp_path, build, 'guard', states={'HELD': {'autonomy': 'confirm'}})
+    go_down, task._go_down = task._go_down, once_held
+    told = task.goes_down()
+    assert told['ended_by'] == 'shutdown'
+    assert any(' left behind before HELD, after ' in line for line in told['log'])
 
 
 class FailsThenRuns(Waits):
