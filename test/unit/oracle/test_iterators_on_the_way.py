@@ -290,3 +290,23 @@ def test_an_iterator_keeps_what_came_to_its_userdata_since_it_began():
     watched = Watched(machine, name='TOP', expert=expert, settings={**ASKS, 'userdata': 'keep'})
     assert watched.run() == 'done'
     assert each.tried == [1, 2, 2, 3, 4] and machine.userdata.note == 'of item 2'
+
+
+class Served:
+    """Makes the items anew each time, and has a length of its own."""
+
+    def __call__(self):
+        return [1, 2, 3]
+
+    def __len__(self):
+        return 7
+
+
+def test_what_makes_the_items_may_have_a_length_of_its_own(log):
+    machine = inside(iterator_over(Item(item2=['aborted']), items=Served()))
+    expert = FakeExpert(goto('ALL', container='TOP'))
+    watched = Watched(machine, name='TOP', expert=expert, settings=ASKS)
+    assert watched.run() == 'done'
+    assert watched.machine.userdata.done == [1, 2, 3]
+    assert any('goes on with item 2 of 3' in text for _, text in log)
+    assert not any('has changed' in text for _, text in log)

@@ -436,3 +436,13 @@ def test_what_it_did_not_write_is_not_handed_to_the_machine_above():
     watched = wrapped(machine, 'PICK', 'SEE/LOOK')
     assert watched.run() == 'done' and len(ends(watched)) == 1
     assert contents(watched.machine.userdata) == {'pose': 'found', 'cup': 'red'}
+
+
+def test_nobody_is_asked_about_what_fails_anywhere_in_a_precondition():
+    expert = FakeExpert()
+    machine = chain(SEE=chain(ARM=chain(LOOK=Scripted('ok', 'aborted'))), PICK=Scripted('aborted'))
+    states = {'LOOK': {'max_recoveries': 0}}
+    watched = wrapped(machine, 'PICK', 'SEE', expert=expert, states=states)
+    assert watched.run() == 'done'
+    assert not expert.questions
+    assert [event.outcome for event in watched.of(EventKind.PRECONDITION_END)] == ['not met']

@@ -92,3 +92,10 @@ def test_a_state_that_heeds_the_preempt_of_an_answer_is_not_said_to_run_on(log):
         if thread.name == 'smach_oracle still running':
             thread.join(20)
     assert not any('does not heed' in text for _, text in log)
+
+
+def test_the_question_says_that_without_an_answer_it_runs_on():
+    gate = Gate()
+    expert = FakeExpert(letting_go(gate, None))
+    assert asked(Scripted('aborted', gate), expert=expert).run() == 'done'
+    assert expert.questions[0].fallback == 'it runs on'

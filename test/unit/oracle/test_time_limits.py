@@ -405,3 +405,27 @@ def test_a_state_that_is_only_observed_runs_in_its_machines_thread_whatever_its_
     machine = watched(state, recover=False, settings={'states': {'A': LIMITED}})
     assert machine.run() == 'done'
     assert threads == [threading.current_thread()]
+
+
+def test_a_precondition_whose_thread_lives_has_not_begun(clock):
+    state = Stubborn()
+
+    def let_it_end(question, cancelled, progress):
+        state.leave()
+        assert wait_for(lambda: 'worker of A' not in str(threading.enumerate()))
+        return supersede('ok')
+
+    clock.end(2, state.stuck)
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', state, {'ok': 'done'})
+        smach.StateMachine.add('B', Scripted('aborted'), {'ok': 'TWIN'})
+        smach.StateMachine.add('TWIN', state, {'ok': 'done'})
+    machine = Watched(
+        machine,
+        expert=FakeExpert(goto('B'), let_it_end),
+        preconditions={'B': ['TWIN']},
+        settings={'states': {'A': ABANDONING, 'TWIN': {'on_retry': 'confirm'}}},
+    )
+    assert machine.run() == 'done'
+    assert machine.visits() == ['A', 'B', 'TWIN'] and state.runs == 2

@@ -245,6 +245,15 @@ def test_when_the_minutes_are_over_it_ends_as_without_an_oracle(clock):
     assert machine.run() == 'done', 'the next trial has minutes of its own'
 
 
+def test_the_log_says_so_too(clock, log):
+    machine = Watched(
+        chain(PICK=Scripted(passing(clock, 31))), name='TOP', settings={'budget': {'minutes': 30}}
+    )
+    assert machine.run() == 'aborted'
+    (told,) = [text for level, text in log if level == 'warn' and 'without an oracle' in text]
+    assert told.startswith('TOP/PICK failed') and "the trial's 30 minutes are over" in told
+
+
 def test_an_exception_is_raised_then(clock):
     def late(state, ud):
         clock.advance(61)

@@ -127,6 +127,16 @@ def test_the_results_in_a_store_of_an_earlier_version_are_read(tmp_path):
     assert len(killed.run()['ways']['PICK']) >= 3
 
 
+def test_a_store_of_an_earlier_version_has_no_pause_and_no_time_of_work(tmp_path):
+    killed, _ = killed_at(tmp_path, 5)
+    with sqlite3.connect(killed.store) as database:
+        database.execute("DELETE FROM facts WHERE name = 'paused'")
+        database.execute("UPDATE facts SET text = '[0, 0, 60]' WHERE name = 'budget'")
+    database.close()
+    assert killed.run()['outcome'] == 'succeeded'
+    assert all(each >= 60 for each in json.loads(facts(killed.store, 'budget')[-1][1])[2:])
+
+
 def test_the_results_of_a_renamed_state_are_those_of_its_new_name():
     renaming = Renaming('TOP', {'GET/PICK': 'TAKE'}, ['', 'GET'])
     value = StoredValue('{}', None)
