@@ -58,11 +58,8 @@ class ContainerLink(NamedTuple):
 
 
 def links_to(node: TreeNode) -> Iterator[ContainerLink]:
-    """Yield the links from the wrapped container above one to it, from above to below.
-
-    The top machine has none.
-    """
-    outer: smach.Container = (node.parent or node).machine
+    """Yield the links from the wrapped container above one, which is there, to it."""
+    outer: smach.Container = cast(TreeNode, node.parent).machine
     for label in node.labels_from_parent:
         inner = cast(smach.Container, children_of(outer)[label])
         yield ContainerLink(outer, label, inner)
