@@ -131,3 +131,12 @@ def test_a_way_that_was_taken_from_the_oracle_is_drawn_again() -> None:
     del ways['ORACLE']['A']
     assert machine.run() == 'done' and state.runs == 4
     assert ways['ORACLE']['A'] == 'A'
+
+
+def test_ways_of_others_in_place_of_those_of_the_oracle_are_replaced() -> None:
+    machine = Watched(chain_of(Scripted('aborted', 'ok', 'aborted')))
+    assert machine.run() == 'done'
+    ways = machine.machine._transitions
+    ways['ORACLE'] = dict.fromkeys(map(str, range(len(ways['ORACLE']))))
+    assert machine.run() == 'done'
+    assert ways['ORACLE']['A'] == 'A'

@@ -41,6 +41,14 @@ def test_what_a_state_has_raised_is_logged_with_its_traceback(log):
     assert 'in execute' in told and told.rstrip().endswith('ValueError: no grasp')
 
 
+@pytest.mark.parametrize('end', [ValueError('no grasp'), SystemExit()])
+def test_what_ends_without_an_outcome_has_an_empty_one(end):
+    machine = Watched(chain(A=chain(B=Scripted(end))), settings={'max_recoveries': 0})
+    with pytest.raises((smach.InvalidUserCodeError, SystemExit)):
+        machine.run()
+    assert [event.outcome for event in machine.of(EventKind.CONTAINER_END)] == ['', '']
+
+
 def test_where_nothing_more_can_be_said_of_a_failure_the_log_says_why(log):
     machine = watched(Scripted('aborted'))
 

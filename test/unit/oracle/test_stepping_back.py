@@ -2,7 +2,7 @@
 
 import pytest
 from guarded_machines import chain
-from machines import FakeExpert, Scripted, Watched, supersede
+from machines import FakeExpert, Gate, Scripted, Watched, supersede
 
 import smach
 from smach_oracle.oracle.decision.policy import Action, Policy, Preconditions
@@ -218,3 +218,23 @@ def test_a_policy_is_told_how_the_preconditions_stand():
     machine.machine._oracle.in_force.policy = Sees('A')
     assert machine.run() == 'done'
     assert seen == [Preconditions.NONE, Preconditions.NOT_MET, Preconditions.MET]
+
+
+def test_what_still_runs_on_the_way_down_is_named_by_its_own_path():
+    gate = Gate()
+
+    def goes_on(question, cancelled, progress):
+        gate.go.set()
+        return supersede('done')
+
+    see = chain(LOOK=Scripted(lambda state, ud: 'ok' if gate.go.wait(20) else 'aborted'))
+    machine = Watched(
+        chain(SEE=see),
+        name='TOP',
+        expert=FakeExpert(goes_on),
+        settings={'states': {'SEE': {'time_limit_s': 0.1, 'grace_period_s': 0.0}}},
+    )
+    machine.machine._oracle.in_force.policy = Elsewhere('SEE/LOOK')
+    assert machine.run() == 'done'
+    (told,) = [event.text for event in machine.of(EventKind.DECISION) if event.path == 'TOP']
+    assert 'TOP/SEE still runs' in told and 'TOP/SEE/LOOK' not in told

@@ -6,6 +6,7 @@ import pytest
 from machines import FakeExpert, Gate, Scripted, chain_of, goto, supersede, watched
 from test_still_running import SOON, asked, failures, letting_go
 
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind
 
 
@@ -99,3 +100,15 @@ def test_the_question_says_that_without_an_answer_it_runs_on():
     expert = FakeExpert(letting_go(gate, None))
     assert asked(Scripted('aborted', gate), expert=expert).run() == 'done'
     assert expert.questions[0].fallback == 'it runs on'
+
+
+def test_a_state_that_the_oracle_enters_is_asked_about_though_it_was_wrapped_on_the_way():
+    def wrap_again(event):
+        if event.kind is EventKind.JUMP:
+            OracleContainer.wrap(machine.machine, settings={**SOON, 'memory': 5})
+
+    gate = Gate()
+    expert = FakeExpert(letting_go(gate, None))
+    machine = asked(Scripted('aborted', gate), expert=expert)
+    machine.machine.events.observers.append(wrap_again)
+    assert machine.run() == 'done' and len(expert.questions) == 1

@@ -6,7 +6,7 @@ import threading
 import pytest
 from fake_clock import FakeClock
 from guarded_machines import chain, deciders, sentences
-from machines import FakeExpert, Scripted, Watched, give_up, goto, waits
+from machines import FakeExpert, FakeWaiting, Scripted, Watched, give_up, goto, waits
 
 import smach
 from smach_oracle.oracle import oracle_of
@@ -365,6 +365,7 @@ def test_a_menu_a_way_and_a_streak_have_the_minutes_of_the_clock_of_work():
     )
     oracle = oracle_of(machine.machine)
     oracle.count_work_by(fake_clock)
+    oracle.waiting = FakeWaiting()
     assert machine.run() == 'done'
     first, second = (event.data for event in machine.of(EventKind.DECISION))
     minutes = {way['kind']: way['minutes'] for way in first['menu']}
