@@ -293,7 +293,7 @@ def test_an_iterator_keeps_what_came_to_its_userdata_since_it_began():
 
 
 class Served:
-    """Makes the items anew each time, and has a length of its own."""
+    """Makes the items each time, and has a length of its own."""
 
     def __call__(self):
         return [1, 2, 3]
