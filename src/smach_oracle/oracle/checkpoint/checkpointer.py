@@ -23,7 +23,7 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, G
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..branches.wrapper import ContainerWrapper, wrappers_around, wrappers_in
+from ..branches.wrapper import wrappers_around, wrappers_in
 from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
@@ -118,8 +118,7 @@ class Checkpointer:
         self._items = {path: told.item for path, told in before.containers.items() if told.item}
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
-        # by key of a container: its node, and what stands around it
-        self._wrappers: Dict[str, Tuple[TreeNode, List[Tuple[str, ContainerWrapper]]]] = {}
+        self._wrappers_around = functools.lru_cache()(wrappers_around)  # most events ask it
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
@@ -137,7 +136,7 @@ class Checkpointer:
             self._begin_trial()
         if event.kind is EventKind.OPERATOR_COMMAND:
             spent = tuple(self._spent())  # such as that it is paused, which must not be delayed
-            if spent:
+            if spent or event.seq >= self._seq_stored + SEQ_RESERVE:
                 self._writer.commit(
                     NewMoment(
                         event.wall_time, event.seq, event.kind.name, self._top.key, '', spent
@@ -241,8 +240,7 @@ class Checkpointer:
         pending = self._pending_of(self._top)
         for node in self._nodes.values():
             pending += self._facts_of(node).all_states()
-        if not self._enters_again(self._top):
-            pending += self._collected(self._top, all_keys=True)
+        pending += self._collected(self._top)
         for goal_id, server in GOALS.running().items():
             self._goals.add(goal_id)
             pending.append(fact_of('', GOAL + goal_id, server))
@@ -342,13 +340,6 @@ class Checkpointer:
 
     def _below(self, path: str) -> List[TreeNode]:
         return [node for key, node in self._nodes.items() if (key + '/').startswith(path + '/')]
-
-    def _wrappers_around(self, node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
-        """Return what `wrappers_around` does, looked for once for each container."""
-        kept = self._wrappers.get(node.key)
-        if kept is None or kept[0] is not node:
-            kept = self._wrappers[node.key] = node, wrappers_around(node)
-        return kept[1]
 
     def _items_around(self, event: Event, node: TreeNode) -> Iterator[Fact]:
         """Yield which items the Iterators around a container have come to, and with what userdata.

@@ -5,7 +5,7 @@ import os
 import shutil
 
 import pytest
-from killed_machines import Diary, KilledMachine, Noted, Points, in_a_process
+from killed_machines import Diary, KilledMachine, Noted, Points, around, in_a_process
 from killed_trees import ENDS, flat, make
 from left_stores import Left
 from test_accepted_stores import DAMAGES, accept
@@ -14,7 +14,7 @@ from test_never_twice import FLAT, NEVER, ByHand, chain, killed_in, moment_of, o
 from test_unanswered import Answers, nobody, questions
 
 import smach
-from smach_oracle.oracle import Expert, OracleContainer
+from smach_oracle.oracle import Expert, OperatorHand, OracleContainer
 from smach_oracle.oracle.checkpoint.container_facts import fact_of
 from smach_oracle.store.rows import NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
@@ -51,6 +51,8 @@ def test_nothing_moves_where_a_state_that_somebody_has_named_is_gone(tmp_path, c
     oracle_state(after, *command)
     told = after.run()
     assert told.get('ended_by') == 'kept', told
+    is_gone = 'was stopped at C, which is not there' in '; '.join(told['log'])
+    assert is_gone == (command[1] == 'C')
     assert after.diary.count('begins') == begun
 
 
@@ -61,6 +63,7 @@ def test_nothing_moves_where_a_place_below_that_somebody_has_named_is_gone(tmp_p
     oracle_state(after, 'goto', 'IN/C')
     told = after.run()
     assert told.get('ended_by') == 'kept', told
+    assert [text for text in told['log'] if 'was stopped at TOP/IN/C, which is not there' in text]
     assert after.diary.count('begins') == begun
 
 
@@ -74,6 +77,56 @@ def test_a_person_is_asked_where_a_state_has_moved_to_where_no_oracle_is(tmp_pat
     told = after.run()
     assert told.get('ended_by') == 'kept', told
     assert after.diary.count('begins') == begun
+
+
+def test_a_person_is_asked_where_what_was_under_way_lies_where_no_oracle_is(tmp_path):
+    killed_while_it_runs(tmp_path, flat_before, 'B')
+    names = {'B': 'IN/B', 'C': 'IN/C'}
+    after = KilledMachine(tmp_path, nested_after, resume_map=names, tree={'nested': False})
+    begun = after.diary.count('begins')
+    told = after.run()
+    assert told.get('ended_by') == 'kept', told
+    assert after.diary.count('begins') == begun
+
+
+def test_where_a_state_is_gone_a_person_is_asked_at_the_initial_state(tmp_path):
+    def begins_in_b(diary, points):
+        machine = flat_before(diary, points)
+        machine.set_initial_state(['B'])
+        return machine
+
+    killed_while_it_runs(tmp_path, begins_in_b, 'C')
+    after = KilledMachine(tmp_path, without(begins_in_b, 'C'))
+    assert after.run(expert=Answers(tmp_path / 'asked', nobody))['ended_by'] == 'kept'
+    assert questions(tmp_path / 'asked')[0][1:3] == ['TOP', 'B']
+
+
+class BegunLater(smach.StateMachine):
+    """Adds its initial state as it is executed."""
+
+    def __init__(self, diary, points):
+        super().__init__(['succeeded', 'aborted'], ['done'], ['done'])
+        self._first = Noted('W', diary, points)
+        with self:
+            smach.StateMachine.add('X', Noted('X', diary, points), {'succeeded': 'Y'})
+            smach.StateMachine.add('Y', Noted('Y', diary, points), ENDS)
+        self._initial_state_label = 'W'
+
+    def execute(self, *userdata):
+        if 'W' not in self.get_children():
+            with self:
+                smach.StateMachine.add('W', self._first, {'succeeded': 'X'})
+        return super().execute(*userdata)
+
+
+def test_where_the_initial_state_is_not_there_yet_a_person_is_asked_at_another_one(tmp_path):
+    def begun_later(diary, points):
+        return around('LATER', BegunLater(diary, points), ENDS)
+
+    killed_while_it_runs(tmp_path, begun_later, 'W')
+    after = KilledMachine(tmp_path, begun_later)
+    assert after.run(expert=Answers(tmp_path / 'asked', nobody))['ended_by'] == 'kept'
+    assert questions(tmp_path / 'asked')[0][1:3] == ['TOP/LATER', 'X']
 
 
 def test_a_person_is_asked_where_no_oracle_leads_to_the_state_any_more(tmp_path):
@@ -297,6 +350,26 @@ def test_many_events_between_two_moments_are_numbered_once(tmp_path):
         kinds = [each.kind for each in store.moments(1)]
     assert len([kind for kind in kinds if kind in ('QUERY_CLAIMED', 'QUERY_RELEASED')]) == 1
     assert killed.run()['events'][0][1] > 1400
+
+
+def test_after_many_commands_of_an_operator_no_number_comes_again(tmp_path):
+    def commanded(diary, points):
+        class Commanded(Noted):
+            def execute(self, userdata):
+                if killed.diary.count('begins')['A']:
+                    return super().execute(userdata)
+                diary.write('begins', 'A')
+                for _ in range(1200):
+                    OperatorHand(machine).set_breakpoint('C')
+                os.kill(os.getpid(), 9)
+
+        machine = flat(diary, points)
+        machine.get_children()['A'].__class__ = Commanded
+        return machine
+
+    killed = KilledMachine(tmp_path, commanded)
+    assert killed.run() is None
+    assert killed.run()['events'][0][1] > 1200
 
 
 # -- a machine that stands under two labels
