@@ -338,18 +338,16 @@ def _entered_at(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
 
 
 def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
-    state = states_of(place.node.machine)[place.label]
-    below = node_of(state)
-    inner = (
-        {}
-        if below is None
-        else dict.fromkeys(visit.state for visit in below.records.history.latest())
-    )
-    if below is None or not any(map(below.has, inner)):
+    below = node_of(states_of(place.node.machine)[place.label])
+    inner: List[TreePlace] = []
+    if below is not None:
+        visited = dict.fromkeys(visit.state for visit in below.records.history.latest())
+        inner = [TreePlace(below, label) for label in visited if below.has(label)]
+    if not inner:
         visits = (
             visit for visit in place.node.records.history.latest() if visit.state == place.label
         )
         yield name, any(visit.result is VisitResult.SUCCESS for visit in visits)
         return
-    for label in filter(below.has, inner):
-        yield from _entered_in(TreePlace(below, label), '{}/{}'.format(name, label))
+    for each in inner:
+        yield from _entered_in(each, '{}/{}'.format(name, each.label))
