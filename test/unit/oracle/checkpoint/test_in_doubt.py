@@ -97,7 +97,9 @@ def test_a_fault_before_the_first_state_is_asked_about_as_well(tmp_path, monkeyp
     left = Left(chain(*LABELS), **NEVER)
     monkeypatch.undo()
     killed = left.killed_at(left.first_in('CARRY'), tmp_path / 'killed')
-    assert killed.run()['ended_by'] == 'kept'
+    told = killed.run()
+    assert told['ended_by'] == 'kept'
+    assert not [text for text in told['log'] if 'failures are told' in text], 'no rule was stored'
     assert killed.diary.count('begins')['POUR'] == 1
 
 

@@ -21,18 +21,25 @@ class Kitchen:
     """Builds LOOK, then PICK, which fails once and then wants an open hand and a clear view."""
 
     def __init__(self, opens):
-        """`opens`: the precondition about the hand, the label OPEN or a pair that achieves it."""
+        """`opens`: the precondition about the hand.
+
+        The label OPEN, a pair that achieves it, or a function that has the name of the meta state.
+        """
         self._opens = opens
         self.preconditions = []
 
     def __call__(self, diary, points):
         def is_clear(userdata):
+            diary.write('begins', 'CLEAR')
             points()
             return True
 
         def is_open(userdata):
             points()
             return 'OPEN' in userdata.done
+
+        def ORACLE(userdata):
+            return is_open(userdata) or Noted('OPEN', diary, points).execute(userdata) != ''
 
         inner = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
         with inner:
@@ -44,10 +51,8 @@ class Kitchen:
         machine.userdata.done = []
         with machine:
             smach.StateMachine.add('KITCHEN', inner, ENDS)
-        self.preconditions[:] = [
-            'OPEN' if self._opens == 'label' else {'check': is_open, 'achieve': 'OPEN'},
-            is_clear,
-        ]
+        ways = {'label': 'OPEN', 'pair': {'check': is_open, 'achieve': 'OPEN'}, 'function': ORACLE}
+        self.preconditions[:] = [ways[self._opens], is_clear]
         return machine
 
 
@@ -67,3 +72,10 @@ def test_it_comes_to_its_end_and_only_what_was_under_way_runs_again(tmp_path, op
         begun, ended = killed.diary.count('begins'), killed.diary.count('ends')
         assert set(ended) == set(usual), (point, ended)
         assert all(begun[name] <= usual[name] + 1 for name in usual), (point, begun)
+
+
+def test_what_a_precondition_has_written_is_kept_whatever_its_name(tmp_path):
+    build = Kitchen('function')
+    left = Left(build, states={'PICK': {'preconditions': build.preconditions}}, userdata='restore')
+    killed = left.killed_at(left.first_in('CLEAR'), tmp_path / 'killed')
+    assert killed.run()['done'] == ['LOOK', 'PICK', 'OPEN', 'PICK', 'PUT']
