@@ -39,7 +39,13 @@ MEANINGS = {
         'not successful',
         'abort_complete',
     ),
-    EndMeaning.PREEMPTED: ('preempted', 'PREEMPTED', 'task_preempted', 'pre-empted'),
+    EndMeaning.PREEMPTED: (
+        'preempted',
+        'PREEMPTED',
+        'task_preempted',
+        'pre-empted',
+        'goal_pre_empted',
+    ),
     EndMeaning.UNKNOWN: (
         'parked',
         'end',

@@ -1,6 +1,7 @@
 """What adapters and operators ask of a machine, and tell it, from outside."""
 
 import copy
+import inspect
 
 import pytest
 from forked import in_a_fork
@@ -21,6 +22,10 @@ from smach_oracle.oracle.scope.scope import Reason, Scope
 
 def warnings_in(log):
     return [text for level, text in log if level == 'warn']
+
+
+def test_tools_can_look_at_all_members_of_the_class():
+    assert dict(inspect.getmembers(OracleContainer))['settings'] is OracleContainer.settings
 
 
 def test_a_bare_machine_has_no_oracle_and_no_hand():

@@ -138,6 +138,8 @@ def test_what_was_learned_can_be_handed_on(kind):
     other = make_estimator('window' if kind == 'exponential' else 'exponential', 5, 0.2)
     other.restore(rate.snapshot())
     assert (other.rate, other.failures, other.successes) == (0.2, 2, 1)
+    other.restore(dict(rate.snapshot(), rate=0.9, window=[1]))
+    assert other.rate == 0.2, 'the totals alone count'
 
 
 @pytest.mark.parametrize(
@@ -147,6 +149,7 @@ def test_what_was_learned_can_be_handed_on(kind):
         {'successes': -1},
         {'failures': 'x'},
         {'estimator': 'window', 'window': 'no'},
+        {'estimator': 'window', 'window': ''},
     ],
 )
 def test_what_is_no_snapshot_is_refused(learned):

@@ -112,6 +112,16 @@ def test_machines_that_live_in_one_program_keep_their_counts(tmp_path):
     assert counts(tmp_path, 'PICK') == counts(tmp_path, 'PLACE') == (1, 1)
 
 
+def test_a_machine_that_is_gone_holds_no_name_though_its_memory_is_not_free_yet(tmp_path):
+    settings = {'rates_file': str(tmp_path / 'rates.json')}
+    gc.disable()
+    try:
+        Watched(chain_of(Scripted('aborted')), name='OLD', settings=settings).run()
+        assert Watched(chain_of(Scripted()), name='NEW', settings=settings).rate('A').failures == 1
+    finally:
+        gc.enable()
+
+
 def test_a_machine_without_a_name_that_lives_keeps_its_counts(tmp_path):
     settings = {'rates_file': str(tmp_path / 'rates.json')}
     plain = Watched(chain_of(Scripted('aborted')), settings=settings)

@@ -109,6 +109,21 @@ def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
     assert seen == ['clean', 'clean']
 
 
+def test_a_machine_that_has_run_since_does_not_change_the_userdata_of_the_start():
+    seen = []
+
+    def write(state, ud):
+        seen.append(ud.note)
+        ud.note = 'used'
+        return 'ok'
+
+    before = Scripted(write, write, input_keys=['note'], output_keys=['note'])
+    top = nested(chain_of(Scripted()), before, Scripted('aborted'))
+    top.userdata.note = 'clean'
+    assert Watched(top, settings={'policy': 'restart'}).run() == 'done'
+    assert seen == ['clean', 'clean']
+
+
 def test_the_restarts_are_those_of_the_trial_whichever_state_has_failed():
     machine = watched(
         Scripted('aborted'),

@@ -1,5 +1,6 @@
 """Scopes, their clocks, and calls that may be left behind."""
 
+import itertools
 import threading
 import time
 
@@ -256,4 +257,29 @@ def test_an_alarm_rings_at_its_time():
     alarms, rung = AlarmClock(FakeClock()), threading.Event()
     alarms.ring_in(0.0, rung.set)
     assert rung.wait(20.0)
+    alarms.rest()
+
+
+@pytest.mark.parametrize('first, then', itertools.permutations((Reason.PREEMPTED, Reason.SHUTDOWN)))
+def test_of_two_reasons_the_one_that_counts_more_stays(first, then):
+    scope = Scope()
+    scope.cancel(first)
+    scope.cancel(then)
+    assert scope.reason is Reason.PREEMPTED
+
+
+def test_an_alarm_that_comes_before_those_that_wait_rings_at_its_time():
+    waits = threading.Event()
+
+    class Told(Clock):
+        def wait(self, *given):
+            waits.set()
+            super().wait(*given)
+
+    alarms, late, rung = AlarmClock(Told()), threading.Event(), threading.Event()
+    alarms.ring_in(3600.0, late.set)
+    assert waits.wait(20.0)
+    alarms.ring_in(0.0, rung.set)
+    assert rung.wait(20.0)
+    alarms.forget(late.set)
     alarms.rest()
