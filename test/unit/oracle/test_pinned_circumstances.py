@@ -17,3 +17,9 @@ PINNED = dict(line.split(' ', 1) for line in held('circumstances'))
 @pytest.mark.parametrize('number', range(pinned_circumstances.TREES))
 def test_trees_tell_the_same_as_ever_under_drawn_circumstances(number, tmp_path):
     assert digests(pinned_circumstances.tell(number, tmp_path)) == PINNED[name_of(number)]
+
+
+@pytest.mark.parametrize('number', range(pinned_circumstances.KILLED))
+def test_trees_that_are_killed_then_go_on_as_ever(number, tmp_path):
+    told = pinned_circumstances.tell_killed(number, tmp_path)
+    assert digests(told) == PINNED[name_of(number, 'killed')]

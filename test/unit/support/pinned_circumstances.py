@@ -10,8 +10,9 @@ unwell, many more settings are drawn, and preconditions and experts may do what 
 import random
 import sys
 import tempfile
+from functools import partial
 from pathlib import Path
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, Iterator, List, Optional, Tuple
 from unittest import mock
 
 HERE = Path(__file__).resolve().parent
@@ -19,7 +20,7 @@ if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
 from pinned import FOLDER
-from pinned_trees import Told, digests, name_of, plan_of
+from pinned_trees import Operated, Told, digests, killed, name_of, plan_of
 from tree_model.plan import machines_of
 
 from smach_oracle.oracle import OracleContainer
@@ -29,7 +30,7 @@ from smach_oracle.oracle.machine import health_watch
 from smach_oracle.oracle.machine.oracle import oracle_of
 from smach_oracle.oracle.prospects import prospects_of
 
-TREES = 80
+TREES, KILLED = 80, 60
 FIRST = 1000  # other plans than those of pinned_trees.py
 TRIALS = 4
 UNWELL_EVERY_S = (20.0, 90.0, 400.0)
@@ -52,10 +53,10 @@ class Circumstances(Told):
     def run(self, trials: int) -> None:
         looks = random.Random(self.plan.seed + ' looks')
         with mock.patch.object(health_watch, 'random', looks):
-            for half in range(2):
-                if half and self._drawn.random() < 0.3:
-                    OracleContainer.wrap(self.machine, settings=self._changed())
-                super().run(trials // 2)
+            super().run(trials - trials // 2)
+            if trials > 1 and self._drawn.random() < 0.3:
+                OracleContainer.wrap(self.machine, settings=self._changed())
+            super().run(trials // 2)
         for each in prospects_of(self.machine):
             self.tell('PROSPECT', each._replace(settings=None))
 
@@ -206,13 +207,27 @@ def tell(number: int, folder: Path) -> List[str]:
     return [line.replace(str(folder), '.') for line in lines]
 
 
+def tell_killed(number: int, folder: Path) -> List[str]:
+    """Return what is stored of such a tree that is killed, and told by one that goes on.
+
+    Every second has an operator instead.
+    """
+    operated = partial(Operated, plan_of(FIRST + number))
+    return killed(operated if number % 2 else partial(Circumstances, number), number, folder)
+
+
+def all_told() -> Iterator[Tuple[str, List[str]]]:
+    """Yield the name of each tree, and what it tells."""
+    for what, trees, telling in (('tree', TREES, tell), ('killed', KILLED, tell_killed)):
+        for number in range(trees):
+            with tempfile.TemporaryDirectory() as folder:
+                yield name_of(number, what), telling(number, Path(folder))
+
+
 def write(folder: Path, pins: bool) -> None:
     """Write what all trees tell, a file each. `pins`: the digests, too."""
     folder.mkdir(exist_ok=True)
-    told = {}
-    for number in range(TREES):
-        with tempfile.TemporaryDirectory() as rates:
-            told[name_of(number)] = tell(number, Path(rates))
+    told = dict(all_told())
     for name, lines in told.items():
         (folder / (name + '.txt')).write_text('\n'.join(lines) + '\n', 'utf-8')
     if pins:

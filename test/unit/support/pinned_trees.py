@@ -139,8 +139,8 @@ class Operated(Told):
     moments each time. What waits is let go in the end.
     """
 
-    def __init__(self, plan: TreePlan) -> None:
-        super().__init__(plan)
+    def __init__(self, plan: TreePlan, **settings: Any) -> None:
+        super().__init__(plan, **settings)
         self._hand = OperatorHand(self.machine)
         self._chance = random.Random(plan.seed + ' operated')
         nodes = nodes_of(self.machine)
@@ -277,6 +277,18 @@ def tell_killed(number: int, folder: Path) -> List[str]:
     """
     beside = is_beside(number)
     plan = plan_of(number, BESIDE if beside else IN_ORDER)
+    lines = killed(partial(Told, plan), number, folder, beside)
+    return sorted(DRAWN.sub(r'\1', line) for line in lines) if beside else lines
+
+
+def killed(
+    made: Callable[..., Told], number: int, folder: Path, at_leafs: bool = False
+) -> List[str]:
+    """Return what is stored of a tree that is killed, and told by one that goes on.
+
+    :param made: makes it, with settings.
+    :param at_leafs: it is killed as a leaf begins, else at any of its events.
+    """
     settings = {
         'checkpoint': str(folder / 'robot.db'),
         'checkpoint_synchronous': 'OFF',
@@ -285,8 +297,8 @@ def tell_killed(number: int, folder: Path) -> List[str]:
     }
 
     def run(points: Points, **settings: Any) -> int:
-        told = Told(plan, **settings)
-        if beside:
+        told = made(**settings)
+        if at_leafs:
             told.world.at_entry = points
         else:
             told.machine.events.observers.append(points)
@@ -294,17 +306,16 @@ def tell_killed(number: int, folder: Path) -> List[str]:
         return points.passed
 
     def resumed() -> List[str]:
-        told = Told(plan, **settings)
+        told = made(**settings)
         told.run(2)
         return told.lines
 
     points = in_a_process(lambda: run(Points(0)))
-    first = 1 if beside else 2
-    dies_at = random.Random(plan.seed + ' killed').randrange(first, points + 1)
+    first = 1 if at_leafs else 2
+    dies_at = random.Random('pinned {} killed'.format(number)).randrange(first, points + 1)
     assert in_a_process(lambda: run(Points(dies_at), **settings)) is None
     stored = _stored(str(folder / 'robot.db'))
-    lines = stored + [line.replace(str(folder), '.') for line in in_a_process(resumed)]
-    return sorted(DRAWN.sub(r'\1', line) for line in lines) if beside else lines
+    return stored + [line.replace(str(folder), '.') for line in in_a_process(resumed)]
 
 
 def _stored(path: str) -> List[str]:
