@@ -28,6 +28,7 @@ from .smach_private import Transitions, data_of, keys_of, opened_container
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
+RAISED = object()  # in place of an outcome, as which a state may have None
 
 
 class _Shown:
@@ -392,7 +393,7 @@ class OracleContainer(smach.StateMachine):
                     else:
                         outcome = state.execute(view.remapper)
                 except Exception as err:
-                    outcome, error = None, err
+                    outcome, error = RAISED, err
                 finally:
                     lock.acquire()
                 try:
@@ -403,7 +404,7 @@ class OracleContainer(smach.StateMachine):
                     # seen for the first time, no plain success, or no outcome at all
                     plain = False
                 if not plain:
-                    ended = end_plainly(node, record, outcome, error)
+                    ended = end_plainly(node, record, outcome)
                     if ended is not None:
                         return ended
                     return Step(node, record).ended(outcome, error)

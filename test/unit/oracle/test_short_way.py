@@ -171,3 +171,14 @@ def test_a_machine_may_have_a_plain_lock():
     machine = watched(Scripted(), Scripted()).machine
     machine._state_transitioning_lock = threading.Lock()
     run_before(machine)
+
+
+def test_a_state_that_has_none_as_an_outcome_fails_where_it_raises():
+    first = Scripted(*[None] * 3, ValueError('slipped'), outcomes=('ok', None))
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', first, {'ok': 'done', None: 'B'})
+        smach.StateMachine.add('B', Scripted(), {'ok': 'done'})
+    wrapped = OracleContainer.wrap(machine)
+    assert [wrapped.execute() for _ in range(4)] == ['done'] * 4
+    assert {row.state: row.failures for row in wrapped.rates()} == {'A': 1, 'B': 0}

@@ -1,6 +1,6 @@
 """Iterators of a wrapped tree: which item is under way, and where one goes on."""
 
-from typing import Callable, Dict, Iterator, Mapping, Optional, Tuple
+from typing import Callable, Dict, Iterator, Mapping, Optional, Tuple, cast
 
 import smach
 
@@ -121,7 +121,7 @@ class IteratorWrapper(ContainerWrapper):
     def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
         self._ended_with = outcome if isinstance(outcome, str) and not self.is_left else None
-        if self.tracked is not None and self.tracked.is_exhausted:
+        if cast(TrackedItems, self.tracked).is_exhausted:
             # the author has gone on behind it where an oracle has given up
             for _, machine in machines_below(self.container):
                 node = node_of(machine)
@@ -171,8 +171,7 @@ class IteratorWrapper(ContainerWrapper):
             self._given = self._snapshot(given)
             return {}
         if (
-            self.tracked is not None
-            and not self.tracked.is_finished
+            not cast(TrackedItems, self.tracked).is_finished
             and self.at_item is not None
             and parent.in_force.userdata == RESTORE
         ):

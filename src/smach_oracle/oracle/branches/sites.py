@@ -94,7 +94,7 @@ class BranchSite(Site):
         """Return the outcome with which the branch ends at an event, None for other events."""
         outcome = event.outcome if event.kind is EventKind.GIVE_UP else event.target
         is_end = event.kind in _LEAVES and outcome and not self._node.is_oracle(outcome)
-        return outcome if is_end and outcome not in states_of(self._node.machine) else None
+        return outcome if is_end else None
 
     def is_line_over(self, event: Event) -> bool:
         """Whether the branch is over by an event."""

@@ -2,7 +2,7 @@
 
 import contextlib
 import threading
-from typing import Callable, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
+from typing import Callable, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple, cast
 
 import smach
 
@@ -212,15 +212,14 @@ class ContainerWrapper:
 
 def wrapper_of(state: object) -> Optional[ContainerWrapper]:
     """Return what is kept beside a Concurrence or an Iterator, or None for anything else."""
-    wrapper = nesting.wrapper_of(state)
-    return wrapper if isinstance(wrapper, ContainerWrapper) else None
+    return cast(Optional[ContainerWrapper], nesting.wrapper_of(state))
 
 
 def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
     """Return them, each with its path, the outermost first."""
-    if node.parent is None or not node.runs_in_branch:
+    if not node.runs_in_branch:
         return []
-    path, found = node.parent.key, []
+    path, found = cast(TreeNode, node.parent).key, []
     for link in links_to(node):
         path = '{}/{}'.format(path, link.label)
         wrapper = wrapper_of(link.inner_container)

@@ -4,7 +4,7 @@ An Iterator that has failed or was left goes on there with the item that was not
 that is started over has its userdata as it was at first, in all containers of the tree.
 """
 
-from typing import Collection, NamedTuple, Optional, Tuple
+from typing import Collection, NamedTuple, Optional, Tuple, cast
 
 from ..asking.question import names
 from ..branches.iterator_wrapper import ask_to_go_on
@@ -158,9 +158,10 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     label = current_label_of(node.machine)
     way = jump_path_to(node, place_at(node, jump.container, jump.state))
     why_not = _why_not(way, jump)
-    if way is None or why_not:
+    if why_not:
         node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)
         return False
+    way = cast(JumpPath, way)
     settle_ways(node, None)
     node.record(label).forget_entry()  # it may have been led to, and is not entered
     entry = prepare_entry(way, jump.written, 'sent')

@@ -96,9 +96,7 @@ def _end(node: TreeNode, label: str, outcome: str, container_outcome: str) -> st
     return container_outcome
 
 
-def end_plainly(
-    node: TreeNode, record: StateRecord, outcome: Any, error: Optional[Exception]
-) -> Optional[str]:
+def end_plainly(node: TreeNode, record: StateRecord, outcome: Any) -> Optional[str]:
     """End the container the short way, where its last state has ended plainly as once before.
 
     It returns the container's outcome, None where more is to be done than that.
@@ -112,14 +110,12 @@ def end_plainly(
         return None
     ending = edge.leads_to
     if (
-        error is not None
-        or edge.message
+        edge.message
         or drawn is not edge.drawn
         or ending in states
-        # a stop, an operator or a departure may have a say, and an early end of the trial
+        # a stop or an operator may have a say, and an early end of the trial
         or has_preempt_flag(machine)
         or node.engine.attentive
-        or node.execution.departure is not None
         or node.tree.early_end.is_near()
         or smach.is_shutdown()
     ):
