@@ -203,3 +203,88 @@ def test_a_preempt_on_the_short_way_reaches_the_state_in_each_execution():
         machine = OracleContainer.wrap(inside(iterator_over(each, (1, 2, 3))))
         assert [machine.execute(), machine.execute()] == ['done', 'preempted']
     assert reached == [True, True]
+
+
+def test_a_branch_that_ends_under_a_shutdown_teaches_nothing(monkeypatch):
+    def shut_down(state, ud):
+        monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
+        return 'ok'
+
+    each = Scripted(*['ok'] * 4, shut_down)
+    iterator = iterator_over(each, (1, 2, 3), outcomes=(*OUTCOMES, 'ok'))
+    machine = OracleContainer.wrap(inside(iterator, transitions={'ok': 'preempted'}))
+    machine.execute()
+    machine.execute()
+    assert {row.state: row.successes for row in machine.rates()}['EACH'] == 4
+
+
+class Hears(Scripted):
+    """Counts its preempts."""
+
+    heard = 0
+
+    def request_preempt(self):
+        self.heard += 1
+        Scripted.request_preempt(self)
+
+
+def test_a_branch_hears_of_a_preempt_once_until_it_has_obeyed():
+    heard = []
+
+    def preempted(state, ud):
+        state.request_preempt()  # not by its container
+        for serviced in (False, False, True):
+            if serviced:
+                state.service_preempt()
+            iterator.request_preempt()
+            heard.append(state.heard)
+        return 'preempted'
+
+    iterator = iterator_over(Hears('ok', preempted), (1, 2, 3))
+    OracleContainer.wrap(inside(iterator)).execute()
+    assert heard == [2, 2, 3]
+
+
+def test_a_preempt_that_comes_before_a_branch_has_a_state_reaches_that():
+    class Copied:
+        def __deepcopy__(self, memo):
+            if not reached:
+                iterator.request_preempt()
+            return self
+
+    def is_reached(state, ud):
+        reached.append(state.preempt_requested())
+        state.service_preempt()
+        return 'preempted'
+
+    reached = []
+    iterator = iterator_over(Scripted(is_reached), (1, 2))
+    machine = OracleContainer.wrap(inside(iterator), settings={'deep_copy_keys': ['done']})
+    machine.userdata.done = Copied()
+    assert machine.execute() == 'preempted' and reached == [True]
+
+
+class Twice(smach.Concurrence):
+    """A user's class that goes through its states one after the other, and goes on when left."""
+
+    def execute(self, parent_ud=None):
+        for label in ('LEFT', 'RIGHT', 'LEFT'):
+            self._states[label].execute(self.userdata)
+        return 'done'
+
+
+def twice(left, right=None):
+    container = Twice(['done', 'aborted', 'preempted'], 'aborted')
+    with container:
+        smach.Concurrence.add('LEFT', left)
+        smach.Concurrence.add('RIGHT', right or Scripted())
+    return container
+
+
+def test_a_branch_that_was_left_has_its_oracle_again_where_its_container_goes_on():
+    expert = FakeExpert(goto('LAST'), supersede('ok'))
+    left = Scripted(*['ok'] * 4, 'aborted', 'aborted')
+    machine = chain(BOTH=twice(left), LAST=Scripted())
+    wrapped = OracleContainer.wrap(machine, expert=expert, settings={'policy': 'always_ask'})
+    assert [wrapped.execute() for _ in range(3)] == ['done'] * 3
+    assert [each.failed_state for each in expert.questions] == ['LEFT', 'LEFT']
