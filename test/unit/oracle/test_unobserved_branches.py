@@ -13,7 +13,9 @@ from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.branches.wrapper import wrapper_of
 from smach_oracle.oracle.operator_hand import OperatorHand
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.visits import VisitResult
 
 OUTCOMES = ('done', 'aborted', 'preempted')
@@ -249,7 +251,9 @@ def test_a_preempt_that_comes_before_a_branch_has_a_state_reaches_that():
     class Copied:
         def __deepcopy__(self, memo):
             if not reached:
+                asked.append('asks')
                 iterator.request_preempt()
+                asked.append('has asked')
             return self
 
     def is_reached(state, ud):
@@ -257,11 +261,35 @@ def test_a_preempt_that_comes_before_a_branch_has_a_state_reaches_that():
         state.service_preempt()
         return 'preempted'
 
-    reached = []
+    asked, reached = [], []
     iterator = iterator_over(Scripted(is_reached), (1, 2))
     machine = OracleContainer.wrap(inside(iterator), settings={'deep_copy_keys': ['done']})
     machine.userdata.done = Copied()
     assert machine.execute() == 'preempted' and reached == [True]
+    assert asked.count('asks') == asked.count('has asked')
+
+
+def test_a_preempt_that_comes_between_two_tries_of_a_branch_is_heard_once():
+    def ask(event):
+        if event.kind is EventKind.JUMP:
+            asking.start()
+            assert wait_for(branch.preempt_requested, 20)
+
+    def serviced(state, ud):
+        heard.append(state.preempt_requested())
+        state.service_preempt()
+        asking.join(20)
+        heard.append(state.preempt_requested())
+        return 'preempted'
+
+    heard = []
+    iterator = iterator_over(Scripted('aborted', serviced), (1, 2))
+    machine = OracleContainer.wrap(inside(iterator), settings={'policy': 'retry'})
+    branch = wrapper_of(iterator).branches['EACH']
+    asking = threading.Thread(target=branch.request_preempt)
+    machine.events.observers.append(ask)
+    machine.execute()
+    assert heard == [True, False]
 
 
 class Twice(smach.Concurrence):
