@@ -1,0 +1,152 @@
+"""Concurrences and Iterators that execute in a way of their own, or at a time of their own."""
+
+import threading
+
+import pytest
+from branch_machines import both, inside, iterator_over
+from guarded_machines import OUTCOMES, chain
+from machines import FakeExpert, Scripted, Watched, goto, in_thread, supersede
+from test_time_limits import ABANDONING, LimitClock
+
+import smach
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.facts import ENDED_BY, TrialEnd
+
+
+class Own(smach.Concurrence):
+    """A user's class. It executes its only state A by a function of that and the userdata."""
+
+    def __init__(self, way, state):
+        smach.Concurrence.__init__(self, [*OUTCOMES, 'ok'], 'aborted')
+        self._way = way
+        with self:
+            smach.Concurrence.add('A', state)
+
+    def a(self):
+        return self._states['A']
+
+    def execute(self, parent_ud=None):
+        return self._way(self.a(), self.userdata)
+
+
+def own(way, *script):
+    return inside(Own(way, Scripted(*script)), transitions={'ok': 'done'})
+
+
+def test_a_class_may_look_at_the_type_of_its_state():
+    machine = own(lambda a, ud: hasattr(type(a), 'execute') and a.execute(ud))
+    assert OracleContainer.wrap(machine).execute() == 'done'
+
+
+def test_a_state_is_preempted_for_its_container_while_its_failure_is_asked_about():
+    def preempt(question, cancelled, progress):
+        container.a().request_preempt()
+        seen.append(container.a().preempt_requested())
+
+    seen, container = [], Own(lambda a, ud: a.execute(ud), Scripted('aborted'))
+    settings = {'policy': 'always_ask'}
+    expert = FakeExpert(preempt)
+    machine = inside(container, transitions={'ok': 'done'})
+    OracleContainer.wrap(machine, expert=expert, settings=settings).execute()
+    assert seen == [True]
+
+
+def test_two_executions_of_one_container_leave_it_with_its_own_states():
+    begun, go_on = [threading.Event(), threading.Event()], [threading.Event(), threading.Event()]
+
+    def waits(number):
+        def wait(state, ud):
+            begun[number].set()
+            assert go_on[number].wait(20)
+            return 'ok'
+
+        return wait
+
+    state = Scripted(waits(0), waits(1))
+    container = Own(lambda a, ud: a.execute(ud), state)
+    machine = OracleContainer.wrap(inside(container, transitions={'ok': 'done'}))
+    runs = []
+    for run, has_begun in zip((machine.execute, container.execute), begun):
+        runs.append(in_thread(run))
+        assert has_begun.wait(20)
+    outcomes = []
+    for run, goes_on in zip(runs, go_on):
+        goes_on.set()
+        outcomes.append(run.result())
+    assert outcomes == ['done', 'ok']
+    assert container.a() is state and container.get_children() == {'A': state}
+
+
+def test_a_container_that_a_state_executes_recovers_though_its_machine_does_not_run():
+    def by_hand(state, ud):
+        assert concurrence.execute() == 'done'
+        return 'ok'
+
+    left = Scripted('aborted')
+    concurrence = both(left, Scripted())
+    machine = chain(HAND=Scripted(by_hand), INNER=inside(concurrence))
+    assert OracleContainer.wrap(machine).execute() == 'done'
+    assert left.runs == 3
+
+
+def test_a_branch_ends_the_program_though_its_container_does_not_say_so():
+    def hides(a, ud):
+        try:
+            a.execute(ud)
+        except SystemExit:
+            pass
+        raise smach.InvalidStateError('A has raised') from None
+
+    machine = Watched(own(hides, SystemExit(3)))
+    with pytest.raises(smach.InvalidUserCodeError):
+        machine.run()
+    assert not machine.of(EventKind.FAILURE)
+    assert machine.events[-1].data[ENDED_BY] == TrialEnd.STOPPED.value
+
+
+def test_an_error_of_smach_that_a_branch_raises_is_passed_on_itself():
+    error = smach.InvalidUserCodeError('no map')
+    error.__cause__ = ValueError('no file')
+    machine = OracleContainer.wrap(inside(iterator_over(Scripted(error))), recover=False)
+    with pytest.raises(smach.InvalidUserCodeError) as raised:
+        machine.execute()
+    assert raised.value is error
+
+
+def test_a_machine_that_is_executed_without_its_iterator_names_no_item():
+    inner = chain(A=Scripted('ok', 'aborted', 'aborted'))
+    iterator = iterator_over(inner, (1, 2, 3), loop_outcomes=['done'])
+    machine = Watched(inside(iterator), recover=False)
+    assert [machine.run(), inner.execute()] == ['aborted', 'aborted']
+    told = [event.text for event in machine.of(EventKind.FAILURE) if event.state == 'A']
+    assert told == ['item 2 of 3', '']
+
+
+class Deaf(Scripted):
+    """A state that hears of no preempt."""
+
+    def request_preempt(self):
+        pass
+
+
+def test_a_branch_waits_for_no_state_that_still_runs_under_another_label(monkeypatch):
+    def overruns(state, ud):
+        stuck.set()
+        assert let_go.wait(20)
+
+    clock, stuck, let_go = LimitClock(monkeypatch), threading.Event(), threading.Event()
+    clock.end(2, stuck)
+    state = Deaf('ok', 'ok', 'ok', overruns)
+    machine = smach.StateMachine(OUTCOMES)
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('ALL', iterator_over(state, (1,)), {'done': 'A'})
+        smach.StateMachine.add('A', state, {'ok': 'done'})
+    expert = FakeExpert(goto('ALL'), supersede('ok'), supersede('ok'))
+    settings = {'states': {'A': ABANDONING}, 'policy': 'always_ask'}
+    wrapped = OracleContainer.wrap(machine, expert=expert, settings=settings)
+    assert [wrapped.execute(), wrapped.execute()] == ['done', 'done']
+    let_go.set()
+    assert state.runs == 4
+    assert [each.failed_state for each in expert.questions] == ['A', 'EACH', 'A']
