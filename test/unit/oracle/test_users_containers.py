@@ -143,7 +143,8 @@ def test_a_branch_waits_for_no_state_that_still_runs_under_another_label(monkeyp
     with machine:
         smach.StateMachine.add('ALL', iterator_over(state, (1,)), {'done': 'A'})
         smach.StateMachine.add('A', state, {'ok': 'done'})
-    expert = FakeExpert(goto('ALL'), supersede('ok'), supersede('ok'))
+        smach.StateMachine.add('B', Scripted(), {'ok': 'ALL'})
+    expert = FakeExpert(goto('B'), supersede('ok'), supersede('ok'))
     settings = {'states': {'A': ABANDONING}, 'policy': 'always_ask'}
     wrapped = OracleContainer.wrap(machine, expert=expert, settings=settings)
     assert [wrapped.execute(), wrapped.execute()] == ['done', 'done']
