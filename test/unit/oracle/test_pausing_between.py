@@ -79,6 +79,27 @@ def test_gates_go_with_the_oracle_and_stay_one() -> None:
     assert iterator._transition_cbs == []
 
 
+def test_a_users_callbacks_stay_beside_a_gate() -> None:
+    told = []
+    machine = items_machine(Scripted())
+    machine['EACH'].register_transition_cb(lambda *args: told.append(len(args)))
+    assert machine.execute() == 'done'
+    bare = [*told]
+    OracleContainer.wrap(machine, nested=False)
+    assert [machine.execute(), machine.execute()] == ['done', 'done']
+    assert told == bare * 3
+
+
+def test_an_item_without_an_oracle_of_its_own_is_confirmed_too() -> None:
+    state = Scripted()
+    settings = {'nested': False, 'autonomy': 'confirm'}
+    with Held(items_machine(state), settings=settings).begin() as held:
+        held.waits_before('SM_ROOT/EACH')
+        held.hand.confirm()
+        held.waits_before('SM_ROOT/EACH/ITEM')
+        assert state.runs == 1
+
+
 @pytest.mark.parametrize(
     'settings, waits_before',
     [({}, 'SM_ROOT/A'), ({'states': {'A': {'autonomy': 'confirm'}}}, 'SM_ROOT/A')],

@@ -6,6 +6,7 @@ import pytest
 from guarded_machines import OUTCOMES, both, chain
 from held_machines import Gate, Held, Trail, eventually
 from machines import FakeExpert, FakeHealth, goto, waits
+from test_short_way import AsksElsewhere
 from waiting import wait_for
 
 import smach
@@ -311,3 +312,32 @@ def test_a_state_from_which_an_operator_sends_the_machine_is_begun_from_its_star
         held.hand.go_to('SM_ROOT', 'FIND')
         held.hand.resume()
         assert (held.end(), trail.ran) == ('done', ['FIND', 'FIND', 'X', 'Y'])
+
+
+def test_a_machine_in_a_second_place_is_passed_by_as_one_that_has_no_oracle():
+    trail = Trail()
+    inner = trail.cleaned()
+    machine = chain(FIRST=chain(X=inner), Y=inner, LAST=trail.state('LAST'))
+    with Held(machine).begin() as held:
+        assert held.end() == 'done' and trail.ran == ['A', 'B'] * 2 + ['LAST']
+        held.hand.set_breakpoint('SM_ROOT/Y')
+        held.begin()
+        held.waits_before('SM_ROOT/Y')
+        held.hand.preempt()
+        assert (held.end(), trail.ran[5:]) == ('preempted', ['A', 'B'])
+
+
+def test_a_stop_that_only_the_machine_around_knows_of_ends_one_before_a_held_state():
+    trail = Trail()
+
+    def ask(state, ud):
+        machine.is_asked = True
+        return 'ok'
+
+    inner = trail.cleaned(trail.state('A', ask), trail.state('B'))
+    machine = AsksElsewhere(OUTCOMES)
+    with machine:
+        smach.StateMachine.add('INNER', inner, {'done': 'done'})
+    settings = {'states': {'INNER/B': {'autonomy': 'confirm'}}}
+    with Held(machine, settings=settings).begin() as held:
+        assert (held.end(), trail.ran) == ('preempted', ['A'])

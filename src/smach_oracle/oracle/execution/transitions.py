@@ -110,8 +110,7 @@ def end_plainly(node: TreeNode, record: StateRecord, outcome: Any) -> Optional[s
         return None
     ending = edge.leads_to
     if (
-        edge.message
-        or drawn is not edge.drawn
+        drawn is not edge.drawn
         or ending in states
         # a stop or an operator may have a say, and an early end of the trial
         or has_preempt_flag(machine)
