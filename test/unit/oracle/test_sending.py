@@ -29,6 +29,17 @@ def test_it_goes_there_once_its_state_has_ended() -> None:
     assert not held.of(EventKind.JUMP, EventKind.FAILURE)
 
 
+@pytest.mark.parametrize('by, named', [('eva', 'eva'), ('', 'an operator')])
+def test_the_log_says_who_has_sent_it(by: str, named: str, log: Any) -> None:
+    held = Held(chain_of(Scripted(), Scripted()))
+    held.hand.pause()
+    with held.begin():
+        held.waits_before('SM_ROOT/A')
+        held.hand.go_to('', 'B', by)
+        held.waits_before('SM_ROOT/B')
+    assert ('info', "State machine sent by {} to 'B' instead of 'A'".format(named)) in log
+
+
 def test_a_paused_machine_goes_there_at_once_and_waits_there() -> None:
     states = [Scripted(), Scripted(), Scripted()]
     held = Held(chain_of(*states))

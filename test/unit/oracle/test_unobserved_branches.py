@@ -317,3 +317,16 @@ def test_a_branch_that_was_left_has_its_oracle_again_where_its_container_goes_on
     wrapped = OracleContainer.wrap(machine, expert=expert, settings={'policy': 'always_ask'})
     assert [wrapped.execute() for _ in range(3)] == ['done'] * 3
     assert [each.failed_state for each in expert.questions] == ['LEFT', 'LEFT']
+
+
+@pytest.mark.parametrize('behind', [{}, {'LAST': Scripted()}])
+def test_a_container_that_ends_well_though_it_was_left_is_left(behind):
+    """It is the last state of its machine, or not."""
+    first, left = Scripted(), Scripted('ok', 'ok', 'aborted')
+    concurrence = both(left, Scripted(), outcome_map={'done': {'RIGHT': 'ok'}})
+    expert, settings = FakeExpert(goto('FIRST')), {'policy': 'always_ask'}
+    machine = OracleContainer.wrap(
+        chain(FIRST=first, BOTH=concurrence, **behind), expert=expert, settings=settings
+    )
+    assert [machine.execute() for _ in range(3)] == ['done'] * 3
+    assert (first.runs, left.runs) == (4, 4)

@@ -1,7 +1,16 @@
 """What ends the wait for health, and the repeats that nobody counts: a cap, and the budget."""
 
 import pytest
-from machines import FakeExpert, FakeHealth, Scripted, goto, supersede, watched
+from machines import (
+    FakeExpert,
+    FakeHealth,
+    Scripted,
+    Watched,
+    chain_of,
+    goto,
+    supersede,
+    watched,
+)
 from test_health import SETTINGS, fails_unwell, heals_at_once, notices
 
 from smach_oracle.oracle.records.events import EventKind
@@ -133,3 +142,28 @@ def test_a_precondition_that_makes_the_robot_unwell_is_not_run_without_end(healt
 def test_the_log_says_of_what_kind_a_failure_is_that_is_not_counted(health, log):
     assert flapping(health, times=1).run() == 'done'
     assert ('info', 'SM_ROOT/A failed, which is not counted: aborted') in log
+
+
+@pytest.mark.parametrize('target, fails', [('aborted', 2), ('B', 1)])
+def test_what_has_failed_as_a_preempt_comes_is_no_failure_though_the_robot_is_not_well(
+    target, fails
+):
+    """It was repeated as often as it may be, or its author recovers from it."""
+
+    def look():
+        if first.runs == fails:
+            machine.machine.request_preempt()
+        return 'motors: off' if first.runs and first.runs != len(healed) else ''
+
+    healed = []
+    first = Scripted('aborted', 'aborted')
+    bare = chain_of(first, Scripted())
+    bare._transitions['A']['aborted'] = target
+    machine = Watched(bare, health=look, settings=dict(SETTINGS, max_recoveries=0))
+    machine.machine.events.observers.append(
+        lambda event: healed.append(event) if event.kind is EventKind.HEALTH_WAIT_START else None
+    )
+    machine.run()
+    assert not machine.of(EventKind.FAILURE) and first.runs == fails
+    ends = [event.data for event in machine.of(EventKind.TRANSITION) if event.state == 'A']
+    assert ends == ([None] if target == 'B' else [])

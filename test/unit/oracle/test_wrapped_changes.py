@@ -28,6 +28,16 @@ def test_a_transition_changed_while_running_is_taken_and_counted():
     assert machine.rate('A').successes == 2
 
 
+def test_an_end_changed_while_running_is_taken():
+    def ends_otherwise(state, ud):
+        machine._transitions['A']['ok'] = 'preempted'
+        return 'ok'
+
+    machine = chain_of(Scripted('ok', 'ok', ends_otherwise))
+    wrapped = OracleContainer.wrap(machine)
+    assert [wrapped.execute() for _ in range(4)] == ['done', 'done', 'preempted', 'preempted']
+
+
 def test_keys_registered_late_are_seen():
     def write(state, ud):
         ud.late = 1

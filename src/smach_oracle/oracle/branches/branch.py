@@ -153,7 +153,6 @@ class Branch(smach.Container):
             history.visits.append(edge.visit)
             if not record.has_preconditions:
                 history.unconditioned = record.label
-            history.succeeded = record.label  # no other state is here
             record.snapshot = None
             if self._item is None:
                 self._rest()

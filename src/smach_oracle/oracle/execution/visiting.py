@@ -61,7 +61,7 @@ def execute_watched(
         node.execution.start_below(way_down)  # before STATE_START, with which it is stored
     try:
         node.emit(STATE_START, record.label)
-        blocked = node.tree.workers.blocked(state) if node.abandoned else ''
+        blocked = node.tree.workers.blocked(state)
         if blocked:
             return Overrun(blocked)
         begun_s = monotonic()
