@@ -487,3 +487,14 @@ def test_a_state_with_the_name_of_a_failure_is_no_end_that_reports_one():
     )
     assert machine.run() == 'done'
     assert machine.visits() == ['WORK', 'REPORT', 'aborted'] and machine.decisions() == []
+
+
+def test_a_success_that_has_led_to_a_failing_end_before_reports_a_failure_too():
+    work = Scripted('ok', 'ok', 'failed', 'ok', outcomes=BAD)
+    states = [
+        ('WORK', work, {'ok': 'REPORT', 'failed': 'REPORT'}),
+        ('REPORT', Scripted(outcomes=('succeeded',)), {'succeeded': 'failed'}),
+    ]
+    machine = Watched(made(states))
+    assert [machine.run() for _ in range(3)] == ['failed'] * 3
+    assert machine.visits()[4:] == ['WORK', 'REPORT', 'WORK', 'REPORT']

@@ -3,6 +3,7 @@
 import copy
 import threading
 
+from branch_machines import iterator_over
 from guarded_machines import OUTCOMES, chain
 from held_machines import Held
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
@@ -164,3 +165,21 @@ def test_a_machine_of_a_class_with_a_private_method_of_that_name_is_entered_in_i
     watched = Watched(chain(**states), name='TOP', expert=expert, settings=ASKS)
     assert watched.run() == 'done'
     assert watched.visits() == ['N', 'A', 'B', 'LAST', 'N', 'B', 'LAST']
+
+
+def test_a_machine_that_was_led_to_and_not_entered_begins_from_its_start_later():
+    first, items = Scripted(), [[], [1]]
+    iterator = iterator_over(
+        chain(X=first, Y=Scripted()), lambda: items.pop(0), loop_outcomes=['done']
+    )
+    again = Scripted('again', outcomes=('ok', 'again'))
+    machine = smach.StateMachine(OUTCOMES)
+    machine.userdata.done = []
+    with machine:
+        smach.StateMachine.add('FIND', Scripted('aborted'), {'ok': 'ALL'})
+        smach.StateMachine.add('ALL', iterator, {'done': 'LAST'})
+        smach.StateMachine.add('LAST', again, {'ok': 'done', 'again': 'ALL'})
+    again.script, again.otherwise = ['again'], 'ok'
+    expert = FakeExpert(goto('Y', container='SM_ROOT/ALL/EACH'))
+    wrapped = OracleContainer.wrap(machine, expert=expert, settings=ASKS)
+    assert (wrapped.execute(), len(expert.questions), first.runs) == ('done', 1, 1)

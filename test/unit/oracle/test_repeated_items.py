@@ -243,3 +243,27 @@ def test_the_machine_says_behind_which_item_none_can_be_got():
     assert watched.run() == 'done'
     texts = [event.text for event in watched.of(EventKind.WARNING)]
     assert texts == ["cannot get the item behind item 1: ValueError('dry')"]
+
+
+def test_an_iterator_that_goes_on_takes_what_was_changed_above_it_meanwhile():
+    def change(question, cancelled, progress):
+        machine.userdata.total = 100
+        return goto('ALL', container='TOP')
+
+    machine = machine_of(over(Adds('ok', 'stuck')))
+    _, left = total_of(machine, change, policy='always_ask', userdata='keep')
+    assert left == (102, [1, 2, 2, 3])
+
+
+def test_an_iterator_whose_state_was_exchanged_as_it_began_goes_on_too():
+    def exchange(*args):
+        with iterator:
+            smach.Iterator.set_contained_state(
+                'EACH', second, loop_outcomes=['ok'], final_outcome_map={'stuck': 'aborted'}
+            )
+
+    second = Adds('ok', 'stuck')
+    iterator = over(Adds())
+    iterator.register_start_cb(exchange)
+    watched, left = total_of(machine_of(iterator))
+    assert left[1] == [1, 2, 2, 3] and told(watched) == WITH_2

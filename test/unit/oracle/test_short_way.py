@@ -182,3 +182,18 @@ def test_a_state_that_has_none_as_an_outcome_fails_where_it_raises():
     wrapped = OracleContainer.wrap(machine)
     assert [wrapped.execute() for _ in range(4)] == ['done'] * 4
     assert {row.state: row.failures for row in wrapped.rates()} == {'A': 1, 'B': 0}
+
+
+def test_each_state_is_preempted_while_only_the_class_knows_of_a_preempt():
+    """But the one behind a state that has serviced it."""
+    seen = []
+
+    def look(state, ud):
+        seen.append(state.preempt_requested())
+        state.service_preempt()
+        return 'ok'
+
+    machine = chain_of(Scripted(), *[Scripted(look) for _ in range(3)], machine_class=AsksElsewhere)
+    machine._states['A'].script = [lambda state, ud: setattr(machine, 'is_asked', True) or 'ok']
+    machine.execute()
+    assert seen == [True, False, True]

@@ -124,7 +124,7 @@ def test_a_machine_that_is_executed_without_its_iterator_names_no_item():
 
 
 class Deaf(Scripted):
-    """A state that hears of no preempt."""
+    """A state that gets no preempt."""
 
     def request_preempt(self):
         pass
@@ -151,3 +151,46 @@ def test_a_branch_waits_for_no_state_that_still_runs_under_another_label(monkeyp
     let_go.set()
     assert state.runs == 4
     assert [each.failed_state for each in expert.questions] == ['A', 'EACH', 'A']
+
+
+def test_where_an_outcome_of_a_container_leads_says_whether_a_branch_has_failed():
+    left = Scripted('aborted')
+    container = both(
+        left,
+        Scripted(),
+        outcomes=['done', 'odd', 'aborted'],
+        outcome_map={'done': {'LEFT': 'ok', 'RIGHT': 'ok'}, 'odd': {'LEFT': 'aborted'}},
+    )
+    machine = inside(container, transitions={'done': 'done', 'odd': 'aborted'})
+    assert (OracleContainer.wrap(machine).execute(), left.runs) == ('done', 2)
+
+
+def test_an_outcome_that_is_registered_later_leads_an_iterator_without_loop_outcomes_on():
+    each, expert = Scripted('aborted'), FakeExpert()
+    iterator = iterator_over(each, (1, 2), break_outcomes=['ok', 'aborted', 'preempted'])
+    each.register_outcomes(['more'])
+    machine = inside(iterator)
+    settings = {'policy': 'always_ask'}
+    OracleContainer.wrap(machine, expert=expert, settings=settings).execute()
+    leads = {each.outcome: each.target for each in expert.questions[0].supersede_outcomes}
+    assert leads['more'] == 'the next item' != leads['ok']
+
+
+def test_a_state_without_a_name_has_no_oracle_of_its_own():
+    nameless, right = Scripted('aborted'), Scripted()
+    container = smach.Concurrence(
+        OUTCOMES, 'aborted', outcome_map={'done': {'': 'ok', 'RIGHT': 'ok'}}
+    )
+    with container:
+        smach.Concurrence.add('', nameless)
+        smach.Concurrence.add('RIGHT', right)
+    machine = OracleContainer.wrap(inside(container))
+    assert (machine.execute(), nameless.runs, right.runs) == ('done', 2, 2)
+    assert [row.state for row in machine.rates()] == ['ALL', 'RIGHT']
+
+
+def test_a_container_without_an_oracle_is_stored_as_any_state(tmp_path, log):
+    settings = {'nested': False, 'checkpoint': str(tmp_path / 'robot.db')}
+    machine = OracleContainer.wrap(inside(both(Scripted(), Scripted())), settings=settings)
+    assert machine.execute() == 'done'
+    assert not [text for level, text in log if level in ('warn', 'err')]

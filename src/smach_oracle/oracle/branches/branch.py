@@ -180,7 +180,7 @@ class Branch(smach.Container):
                 self._item.begin_item()
         error: Optional[BaseException] = None
         try:
-            if not node.execution.begin_branch(has_ended=end is not None) and end is None:
+            if not node.execution.begin_branch(has_ended=end is not None):
                 smach.logwarn(
                     '{}: a branch does not begin, as {}'.format(node.path, node.why_left_behind())
                 )
