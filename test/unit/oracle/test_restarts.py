@@ -7,6 +7,7 @@ import pytest
 from machines import Scripted, Watched, chain_of, contents, watched
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind
 
 
@@ -221,3 +222,19 @@ def test_a_copy_numbers_its_visits_from_one():
     machine.run()
     machine.machine._oracle.tree.next_visit()
     assert copy.deepcopy(machine.machine)._oracle.tree.next_visit() == 1
+
+
+@pytest.mark.parametrize('policy', ['restart', 'retry'])
+def test_where_the_oracle_only_observes_nothing_is_kept_of_the_start(policy):
+    class Copied:
+        times = 0
+
+        def __deepcopy__(self, memo):
+            Copied.times += 1
+            return self
+
+    machine = chain_of(Scripted(), Scripted())
+    settings = {'policy': policy, 'deep_copy_keys': ['x']}
+    machine = OracleContainer.wrap(machine, settings=settings, recover=False)
+    machine.userdata.x = Copied()
+    assert (machine.execute(), Copied.times) == ('done', 2)

@@ -3,7 +3,7 @@
 import threading
 
 import pytest
-from branch_machines import both, inside, iterator_over
+from branch_machines import Item, both, inside, iterator_over
 from guarded_machines import OUTCOMES, chain
 from machines import FakeExpert, Scripted, Watched, goto, in_thread, supersede
 from test_time_limits import ABANDONING, LimitClock
@@ -195,3 +195,12 @@ def test_a_container_without_an_oracle_is_stored_as_any_state(tmp_path, log):
     machine = OracleContainer.wrap(inside(both(Scripted(), Scripted())), settings=settings)
     assert machine.execute() == 'done'
     assert not [text for level, text in log if level in ('warn', 'err')]
+
+
+def test_an_iterator_that_is_executed_by_hand_is_no_execution_in_its_tree(log):
+    iterator = iterator_over(Item(), iter([1, 2, 3]))
+    assert OracleContainer.wrap(inside(iterator)).execute() == 'done'
+    userdata = smach.UserData()
+    userdata.done = []
+    assert iterator.execute(userdata) == 'done'
+    assert not [text for level, text in log if level == 'warn']
