@@ -386,7 +386,7 @@ class OracleContainer(smach.StateMachine):
                 try:
                     if constants:
                         write_constants(userdata, constants)
-                    if record.special or node.abandoned:
+                    if record.special or node.tree.workers.abandoned:
                         outcome = execute_watched(node, record, state, view.remapper)
                     elif observed:
                         outcome = execute_observed(node, record, state, view.remapper)

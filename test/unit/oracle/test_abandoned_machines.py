@@ -1,8 +1,13 @@
 """A nested machine whose state overran its limit and was abandoned: it stops, and tells nothing."""
 
+import copy
+import os
+import pickle
 import threading
 
 import pytest
+from branch_machines import inside, iterator_over
+from guarded_machines import chain
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, in_thread, supersede
 from test_time_limits import LimitClock
 from waiting import wait_for
@@ -11,6 +16,7 @@ import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind, EventSource
 
+UPSTREAM = bool(os.environ.get('SMACH_UPSTREAM'))
 LIMITS = {'X': {'time_limit_s': 30.0, 'grace_period_s': 0.1}}
 
 
@@ -256,3 +262,43 @@ def test_a_source_tells_nothing_between_two_trials():
     source.emit(EventKind.TRANSITION, 'TOP/X', of_trial='one')
     source.emit(EventKind.TRIAL_START, 'TOP', of_trial='two')
     assert told == [('one', EventKind.TRIAL_END), ('two', EventKind.TRIAL_START)]
+
+
+HERE = threading.Event()
+
+
+class Stays(smach.State):
+    """Heeds no preempt, until HERE is set."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['done', 'aborted', 'preempted'])
+
+    def execute(self, ud):
+        return 'done' if HERE.wait(20) else 'aborted'
+
+
+def by_pickle(machine):
+    return pickle.loads(pickle.dumps(machine))
+
+
+@pytest.mark.parametrize(
+    'label, made',
+    [
+        ('A', lambda state: chain(A=state)),
+        pytest.param(
+            'EACH',
+            lambda state: inside(iterator_over(state, (1,), loop_outcomes=['done'])),
+            marks=pytest.mark.skipif(UPSTREAM, reason='its Iterator holds a lock'),
+        ),
+    ],
+)
+@pytest.mark.parametrize('copied', [copy.deepcopy, by_pickle])
+def test_a_machine_of_which_a_state_was_left_behind_can_be_copied(copied, label, made):
+    HERE.clear()
+    settings = {'states': {label: {'time_limit_s': 0.05, 'grace_period_s': 0.0}}}
+    machine = made(Stays())
+    OracleContainer.wrap(machine, settings=settings, expert=FakeExpert(supersede('done')))
+    assert machine.execute() == 'done'
+    other = copied(machine)
+    HERE.set()
+    assert other.execute() == 'done'

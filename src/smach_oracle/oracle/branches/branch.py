@@ -115,7 +115,7 @@ class Branch(smach.Container):
                 record is None
                 or record.special
                 or node.events.observers
-                or node.abandoned
+                or tree.workers.abandoned
                 or control.is_set
                 or early_end.why is not None
                 or execution.departure is not None

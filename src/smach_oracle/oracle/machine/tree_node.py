@@ -73,7 +73,6 @@ class TreeNode:
         """Become part of a tree."""
         self.tree = tree
         self.events = tree.events
-        self.abandoned = tree.workers.abandoned
         self.trial_id = ''
 
     # -- its place
@@ -299,7 +298,6 @@ class TreeNode:
         """Find out at the first state of an execution what the engine is like."""
         self.engine.look(self.machine, self.in_force.limits_autonomy, self.tree.classes)
         self.tree.control.attend(self.engine)
-        self.abandoned = self.tree.workers.abandoned
 
     def snapshot(self) -> Dict[str, object]:
         """Return the userdata as it is now."""
