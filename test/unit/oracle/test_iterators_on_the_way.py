@@ -310,3 +310,33 @@ def test_what_makes_the_items_may_have_a_length_of_its_own(log):
     assert watched.machine.userdata.done == [1, 2, 3]
     assert any('goes on with item 2 of 3' in text for _, text in log)
     assert not any('has changed' in text for _, text in log)
+
+
+class Looks(smach.State):
+    """Has declared no key. Notes the item if it finds it nevertheless."""
+
+    def __init__(self):
+        smach.State.__init__(self, ['ok', 'aborted', 'preempted'])
+        self.found = []
+
+    def execute(self, ud):
+        try:
+            self.found.append(ud.item)
+        except (AttributeError, KeyError, smach.InvalidUserCodeError):
+            self.found.append(None)
+        return 'ok'
+
+
+def test_a_state_finds_what_its_iterator_gives_it_with_an_oracle_and_without():
+    bare, wrapped = Looks(), Looks()
+    assert inside(iterator_over(bare)).execute() == 'done'
+    assert Watched(inside(iterator_over(wrapped))).run() == 'done'
+    assert bare.found == wrapped.found
+
+
+def test_a_precondition_of_an_item_finds_its_own_keys_alone():
+    given = Looks()
+    machine = inside(iterator_over(Item(item1=['aborted'])))
+    settings = {'states': {'EACH': {'preconditions': [given]}}}
+    assert Watched(machine, settings=settings).run() == 'done'
+    assert given.found == [None]

@@ -112,3 +112,13 @@ def test_a_state_that_the_oracle_enters_is_asked_about_though_it_was_wrapped_on_
     machine = asked(Scripted('aborted', gate), expert=expert)
     machine.machine.events.observers.append(wrap_again)
     assert machine.run() == 'done' and len(expert.questions) == 1
+
+
+def test_where_nobody_is_there_to_be_asked_the_log_gives_no_reason():
+    gate = Gate()
+    machine = asked(Scripted('aborted', gate))
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.WARNING and gate.go.set()
+    )
+    assert machine.run() == 'done'
+    assert 'Nobody' not in machine.of(EventKind.WARNING)[0].text

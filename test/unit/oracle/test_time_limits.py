@@ -229,6 +229,24 @@ def test_a_decision_says_which_state_still_runs_that_it_would_go_back_to(clock):
     state.leave()
 
 
+def test_a_state_that_overruns_as_a_precondition_is_not_met(clock):
+    state = Stubborn()
+    clock.end(2, state.stuck)
+    machine = Watched(
+        chain_of(Scripted('aborted'), state),
+        preconditions={'A': ['B']},
+        settings={'states': {'B': ABANDONING}},
+        expert=FakeExpert(supersede('ok')),
+    )
+    machine.machine.events.observers.append(
+        lambda event: event.kind is EventKind.PRECONDITION_END and state.leave()
+    )
+    machine.run()
+    assert machine.of(EventKind.PRECONDITION_END)[0].text == (
+        'overran its time limit of 30 s and was abandoned 0.1 s after it was preempted'
+    )
+
+
 def test_it_is_blocked_under_its_other_label_and_as_a_precondition_too(clock):
     state = Stubborn()
     clock.end(2, state.stuck)

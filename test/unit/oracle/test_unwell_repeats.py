@@ -65,3 +65,17 @@ def test_a_state_that_must_not_be_repeated_is_not_when_all_is_well_again(health)
     assert healthy_again(machine, health, run) == 'done'
     assert machine.visits() == ['A', 'B', 'C']
     assert len(expert.questions) == 2, 'the answer that names it is refused'
+
+
+def test_a_precondition_that_failed_while_all_was_well_is_not_tried_again(health):
+    """The robot is unwell once, when it has long been looked at for that."""
+    clear = Scripted('aborted', 'ok')
+    machine = watched(
+        Scripted('aborted'),
+        health=health,
+        preconditions={'A': [clear]},
+        settings={'health_settle_s': 0.0},
+    )
+    health.said = ['', '', 'motors: off']
+    assert machine.run() == 'done'
+    assert clear.runs == 1 and len(machine.of(EventKind.HEALTH_WAIT_START)) == 1
