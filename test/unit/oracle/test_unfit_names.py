@@ -73,3 +73,19 @@ def test_a_name_of_no_state_stops_a_wrap_where_that_is_strict_and_is_logged_else
     log.clear()
     OracleContainer.wrap(tree(), settings={'states': states}, strict=False)
     assert len([text for level, text in log if level == 'warn']) == 1
+
+
+class Duck:
+    """Has all that a state has, and is none."""
+
+    def __init__(self):
+        self._state = Scripted()
+
+    def __getattr__(self, name):
+        return getattr(self._state, name)
+
+
+def test_what_is_no_state_has_no_oracle_that_could_be_named():
+    tree = chain(BOTH=both(DUCK=Duck(), BIRD=Scripted()))
+    found = unfit_in(tree, {'nested': ['BOTH/DUCK', 'BOTH/BIRD']})
+    assert len(found) == 1 and 'BOTH/DUCK' in found[0]
