@@ -2,7 +2,7 @@
 
 import pytest
 from machines import FakeExpert, Scripted, Watched, goto
-from reporting_machines import BAD, reporting
+from reporting_machines import BAD, made, reporting
 from test_ways import ENDS, at_once, failing, menu_at
 
 import smach
@@ -96,3 +96,18 @@ def test_a_failure_is_reported_though_a_state_in_between_is_gone():
     assert machine.run() == 'done'
     assert machine.visits() == ['LOOK', 'WORK', 'STOW', 'CALL', 'REPORT', 'WORK']
     assert [question.failed_state for question in expert.questions] == ['STOW', 'WORK']
+
+
+def test_the_listing_goes_back_to_the_latest_state_that_is_left():
+    def tell(state, ud):
+        if 'LOOK' in machine.machine.get_children():
+            taken_away(machine.machine, 'LOOK')
+        return 'said'
+
+    home = 'HOME', Scripted('seen', outcomes=('past', 'seen')), {'seen': 'LOOK', 'past': 'WORK'}
+    look = 'LOOK', Scripted(outcomes=('seen',)), {'seen': 'WORK'}
+    work = 'WORK', Scripted('failed', outcomes=BAD), {'ok': 'done', 'failed': 'REPORT'}
+    report = 'REPORT', Scripted(tell, outcomes=('said',)), {'said': 'failed'}
+    machine = Watched(made([home, look, work, report]), settings={'policy': 'algorithm1'})
+    assert machine.run() == 'done'
+    assert machine.of(EventKind.JUMP)[0].target == 'HOME'
