@@ -175,3 +175,37 @@ def test_a_container_that_raises_as_it_is_left_counts_as_left():
         (row.state, row.outcome, row.to): row.count for row in watched.machine.transition_counts()
     }
     assert counted['ARM', 'left', 'ORACLE'] == 1
+
+
+class Twice(smach.StateMachine):
+    """Does all its work twice."""
+
+    def execute(self, parent_ud=None):
+        super().execute(parent_ud)
+        return super().execute(parent_ud)
+
+
+def test_a_machine_that_begins_once_more_forgets_where_it_was_led_and_what_it_had_then():
+    seen, numbers = [], iter(range(9))
+
+    def counts(state, ud):
+        ud.x = number = next(numbers)
+        return 'aborted' if number == 2 else 'ok'
+
+    def notes(state, ud):
+        seen.append(ud.x)
+        return 'ok'
+
+    inner = Twice(['done', 'aborted', 'preempted'])
+    with inner:
+        smach.StateMachine.add('A', Scripted(*[counts] * 9, output_keys=['x']), {'ok': 'B'})
+        smach.StateMachine.add('B', Scripted(*[notes] * 9, input_keys=['x']), {'ok': 'done'})
+    watched = Watched(
+        chain(IN=inner, LAST=Scripted('aborted')),
+        name='TOP',
+        expert=FakeExpert(goto('B', container='TOP/IN'), goto('B')),
+        settings={'max_recoveries': 0},
+    )
+    assert watched.run() == 'done'
+    once, again = ['IN', 'A', 'B', 'A', 'B', 'LAST'], ['IN', 'B', 'A', 'B', 'LAST']
+    assert watched.visits() == once + again and seen == [0, 1, 1, 2]
