@@ -76,7 +76,7 @@ def test_a_name_of_no_state_stops_a_wrap_where_that_is_strict_and_is_logged_else
 
 
 class Duck:
-    """Has all that a state has, and is none."""
+    """Has all that a state has, but is not made from one."""
 
     def __init__(self):
         self._state = Scripted()
