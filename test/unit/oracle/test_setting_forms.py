@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+import weakref
 
 import pytest
 
@@ -22,6 +23,17 @@ def answers(name):
     """Resolve any name to this function."""
     assert name
     return answers
+
+
+def test_what_stands_for_a_state_is_one_as_a_precondition():
+    state = smach.State(['done'])
+    spec = parse_precondition('preconditions', weakref.proxy(state))
+    assert spec.kind is PreconditionKind.STATE
+
+
+def test_what_may_be_left_out_may_be_none():
+    check = checks.optional(checks.number(0, 1, 'from 0 to 1'))
+    assert check('share', None) is None and check('share', 0.5) == 0.5
 
 
 @pytest.mark.parametrize('given', [('goto', 'HOME'), {'goto': 'HOME'}, 'goto:HOME'])

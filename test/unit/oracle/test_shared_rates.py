@@ -366,6 +366,10 @@ def test_a_failure_that_is_taken_back_is_taken_out(kind):
     found = merged(mine.snapshot(), base, others, 5)
     assert (found['successes'], found['failures']) == (2, 0)
     assert found.get('window', [0, 0]) == [0, 0] and found.get('rate', 0) < 0.1
+    mine.add(False)
+    found = merged(mine.snapshot(), base, others, 5)
+    assert (found['successes'], found['failures']) == (3, 0)
+    assert found.get('window', [0, 0, 0]) == [0, 0, 0]
 
 
 @pytest.fixture

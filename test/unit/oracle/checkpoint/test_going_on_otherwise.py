@@ -3,6 +3,7 @@
 import contextlib
 import os
 import shutil
+import time
 
 import pytest
 from killed_machines import Diary, KilledMachine, Noted, Points, around, in_a_process
@@ -215,6 +216,27 @@ def test_sent_to_a_state_that_has_moved_it_repeats_what_somebody_allows(tmp_path
     }
 
 
+def beside_an_own(diary, points):
+    """A Concurrence of a plain state and a machine that the script has given an oracle itself."""
+    inner = OracleContainer(['succeeded', 'aborted'], ['done'], ['done'])
+    with inner:
+        for label, following in (('P', 'Q'), ('Q', 'succeeded')):
+            state = Noted(label, diary, points)
+            smach.StateMachine.add(label, state, dict(ENDS, succeeded=following))
+    both = smach.Concurrence(['succeeded', 'aborted'], 'succeeded', ['done'], ['done'])
+    with both:
+        smach.Concurrence.add('LEFT', Noted('LEFT', diary, points))
+        smach.Concurrence.add('INNER', inner)
+    return around('BOTH', both, ENDS)
+
+
+def test_a_concurrence_whose_branches_have_no_oracle_begins_again_as_a_whole(tmp_path):
+    left = Left(beside_an_own, tree={'nested': False})
+    killed = left.killed_at(left.first_in('Q'), tmp_path / 'killed')
+    assert killed.run().get('outcome') == 'succeeded'
+    assert killed.diary.count('begins')['P'] == killed.diary.count('begins')['Q'] == 2
+
+
 # -- questions
 
 
@@ -263,6 +285,13 @@ def test_a_trial_that_was_stopped_before_its_first_moment_does_not_go_on(tmp_pat
         store.begin_trial(NewTrial('TOP', 'of before', ('', '{}'), 0.0))
     told = killed.run()
     assert (told['outcome'], told['events'][0][0]) == ('succeeded', 'TRIAL_START')
+
+
+def test_where_the_clock_was_put_back_the_program_was_stopped_just_now(tmp_path):
+    killed = killed_in(tmp_path / 'killed', FLAT, 'CARRY')
+    with contextlib.closing(StoreFile(killed.store)) as store:
+        store.add(1, [NewMoment(time.time() + 9000.0, 0, 'MARKS', 'TOP', '', ())])
+    assert [text for text in killed.run()['log'] if 'its program was stopped 0 s ago' in text]
 
 
 def test_after_a_loss_the_trial_that_is_left_goes_on(tmp_path):
@@ -370,6 +399,34 @@ def test_after_many_commands_of_an_operator_no_number_comes_again(tmp_path):
     killed = KilledMachine(tmp_path, commanded)
     assert killed.run() is None
     assert killed.run()['events'][0][1] > 1200
+
+
+# -- userdata
+
+
+def test_a_key_that_had_gone_does_not_come_back(tmp_path):
+    def dropping(diary, points):
+        class Drops(Noted):
+            def execute(self, userdata):
+                machine.userdata = smach.UserData()
+                machine.userdata.done = []
+                return 'succeeded'
+
+        class Looks(Noted):
+            def execute(self, userdata):
+                diary.write('finds', ' '.join(machine.userdata.keys()))
+                return super().execute(userdata)
+
+        machine = flat(diary, points)
+        machine.userdata.extra = 'of the script'
+        for label, kind in (('A', Drops), ('B', Looks)):
+            machine.get_children()[label].__class__ = kind
+        return machine
+
+    left = Left(dropping, userdata='keep')
+    killed = left.killed_at(left.first_in('B'), tmp_path / 'killed')
+    assert killed.run()['outcome'] == 'succeeded'
+    assert set(killed.diary.count('finds')) == {'done'}
 
 
 # -- a machine that stands under two labels

@@ -9,6 +9,7 @@ from left_stores import Left
 from test_never_twice import NEVER, ByHand, Sends, chain, killed_in, oracle_state
 
 import smach
+from smach_oracle.oracle import Expert
 from smach_oracle.oracle.checkpoint.checkpointer import Checkpointer
 from smach_oracle.store.store_file import StoreFile
 
@@ -76,6 +77,17 @@ def test_after_a_fault_of_the_store_nothing_moves_until_somebody_answers(
         assert (told['outcome'], told['ended_by']) == (None, 'kept')
     assert killed.diary.count('begins') == begun
     assert 'kept, as nobody answered: TOP/LOOK' in oracle_state(killed)
+
+
+def test_a_person_is_told_what_may_have_run_meanwhile(tmp_path):
+    class Told(Expert):
+        def ask(self, question, cancelled, progress):
+            here = [each for each in question.choices if each.state == 'POUR']
+            (tmp_path / 'repeats').write_text(' '.join(here[0].repeats))
+
+    killed = broken(tmp_path / 'killed', **NEVER)
+    assert killed.run(expert=Told())['ended_by'] == 'kept'
+    assert (tmp_path / 'repeats').read_text() == 'POUR'
 
 
 @pytest.mark.parametrize('way', sorted(WAYS))
