@@ -5,7 +5,7 @@ import threading
 import pytest
 from guarded_machines import chain, guarded
 from machines import FakeExpert, FakeHealth, Gate, Scripted, Watched, goto, in_thread, supersede
-from test_still_running import asked, told
+from test_still_running import SOON, asked, told
 from waiting import wait_for
 
 import smach
@@ -203,6 +203,24 @@ def test_a_state_that_is_answered_and_then_taken_away_is_an_error():
     machine = asked(Scripted('aborted', take_away), Scripted(), expert=FakeExpert(goto('B')))
     with pytest.raises(smach.InvalidStateError, match='there is no way to SM_ROOT/B'):
         machine.run()
+
+
+def test_a_state_of_another_container_that_was_taken_away_is_named_by_its_own_path():
+    def take_away(state, ud):
+        ended = Gate()(state, ud)
+        for table in (top._states, top._transitions):
+            del table['GONE']
+        return ended
+
+    top = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with top:
+        smach.StateMachine.add('IN', chain(A=Scripted('aborted', take_away)), {'done': 'done'})
+        smach.StateMachine.add('GONE', Scripted(), {'ok': 'done'})
+    expert = FakeExpert(goto('GONE', container='SM_ROOT'))
+    machine = Watched(top, expert=expert, settings=SOON)
+    assert machine.run() == 'done'
+    (failure,) = [event for event in machine.of(EventKind.FAILURE) if event.state == 'IN']
+    assert failure.text.endswith('there is no way to SM_ROOT/GONE')
 
 
 def test_a_preempt_ends_the_wait_until_the_robot_is_well_for_what_was_answered():
