@@ -341,3 +341,26 @@ def test_a_stop_that_only_the_machine_around_knows_of_ends_one_before_a_held_sta
     settings = {'states': {'INNER/B': {'autonomy': 'confirm'}}}
     with Held(machine, settings=settings).begin() as held:
         assert (held.end(), trail.ran) == ('preempted', ['A'])
+
+
+class Services(AsksElsewhere):
+    """Has its own way to service a stop, too."""
+
+    def service_preempt(self):
+        self.is_asked = False
+        AsksElsewhere.service_preempt(self)
+
+
+def test_a_class_that_ends_before_a_held_state_services_the_stop_in_its_own_way():
+    trail = Trail()
+
+    def ask(state, ud):
+        machine.is_asked = True
+        return 'ok'
+
+    machine = Services(OUTCOMES)
+    with machine:
+        smach.StateMachine.add('A', trail.state('A', ask), {'ok': 'B'})
+        smach.StateMachine.add('B', trail.state('B', outcomes=('ok',)), {'ok': 'done'})
+    with Held(machine, settings=CONFIRM).begin() as held:
+        assert (held.end(), trail.ran, machine.is_asked) == ('preempted', ['A'], False)

@@ -197,3 +197,13 @@ def test_each_state_is_preempted_while_only_the_class_knows_of_a_preempt():
     machine._states['A'].script = [lambda state, ud: setattr(machine, 'is_asked', True) or 'ok']
     machine.execute()
     assert seen == [True, False, True]
+
+
+def test_an_end_by_preempted_teaches_nothing_however_often_it_comes():
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('A', Scripted(*['preempted'] * 3), {'ok': 'done', 'preempted': 'B'})
+        smach.StateMachine.add('B', Scripted(), {'ok': 'done'})
+    wrapped = OracleContainer.wrap(machine)
+    assert [wrapped.execute() for _ in range(3)] == ['done'] * 3
+    assert {row.state: row.successes for row in wrapped.rates()} == {'A': 0, 'B': 3}
