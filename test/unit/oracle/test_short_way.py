@@ -10,6 +10,8 @@ from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.facts import ENDED_BY, TrialEnd
 
 
 def run_before(machine):
@@ -207,3 +209,18 @@ def test_an_end_by_preempted_teaches_nothing_however_often_it_comes():
     wrapped = OracleContainer.wrap(machine)
     assert [wrapped.execute() for _ in range(3)] == ['done'] * 3
     assert {row.state: row.successes for row in wrapped.rates()} == {'A': 0, 'B': 3}
+
+
+def test_a_trial_that_a_shutdown_has_ended_says_so_though_that_is_over(monkeypatch):
+    def set_shutdown(is_shutdown):
+        monkeypatch.setattr(smach, 'is_shutdown', lambda: is_shutdown)
+
+    first = Scripted()
+    machine = watched(first, Scripted())
+    run_before(machine.machine)
+    machine.machine.events.observers.append(
+        lambda event: set_shutdown(False) if event.kind is EventKind.CONTAINER_END else None
+    )
+    first.script = [lambda state, ud: set_shutdown(True) or 'ok']
+    assert machine.run() is None
+    assert machine.events[-1].data == {ENDED_BY: TrialEnd.SHUTDOWN.value}
