@@ -183,3 +183,16 @@ def test_a_machine_that_was_led_to_and_not_entered_begins_from_its_start_later()
     expert = FakeExpert(goto('Y', container='SM_ROOT/ALL/EACH'))
     wrapped = OracleContainer.wrap(machine, expert=expert, settings=ASKS)
     assert (wrapped.execute(), len(expert.questions), first.runs) == ('done', 1, 1)
+
+
+def test_a_state_to_which_the_oracle_led_before_is_come_to_by_itself_later():
+    def takes_long(state, ud):
+        assert not threading.Event().wait(0.3)  # six times as long as it takes to ask
+        return 'ok'
+
+    expert = FakeExpert(goto('B'), goto('A'))
+    machine = asked(
+        Scripted('aborted', 'ok'), Scripted('aborted', takes_long), expert=expert, max_recoveries=0
+    )
+    assert machine.run() == 'done'
+    assert [question.failed_state for question in expert.questions] == ['A', 'B']
