@@ -338,6 +338,11 @@ def test_results_that_a_program_of_an_earlier_version_has_dropped_stay():
     assert merged_ways(own.told(), {'ways_total': 5}, {'successes': 3}) == own.told()
 
 
+def test_where_nobody_has_results_none_are_told():
+    emptied = {'ways': {'names': [], 'failures': [], 'results': []}, 'ways_total': 3}
+    assert merged_ways({}, {}, emptied) == {}
+
+
 def test_a_state_has_so_many_kinds_of_failure_with_a_text():
     log = WayLog()
     for number in range(MOST_FAILURES + 3):
