@@ -79,6 +79,19 @@ def test_gates_go_with_the_oracle_and_stay_one() -> None:
     assert iterator._transition_cbs == []
 
 
+def test_an_iterator_that_is_in_another_machine_now_waits_for_that() -> None:
+    gate = Gate()
+    before = OracleContainer.wrap(items_machine(Scripted(gate)), nested=False)
+    machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('ITS', before['EACH'])
+    with Held(machine, settings={'nested': False}).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/ITS/ITEM')
+
+
 def test_a_users_callbacks_stay_beside_a_gate() -> None:
     told = []
     machine = items_machine(Scripted())

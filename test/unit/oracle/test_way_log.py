@@ -12,6 +12,7 @@ from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.decision.ways import BY_PERSON, FIRST, LATER, WayResult
 from smach_oracle.oracle.machine.nesting import marked_node, settle_ways
 from smach_oracle.oracle.machine.state_record import FastEdge, StateRecord
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.records.way_results import (
     MOST_FAILURES,
@@ -409,3 +410,9 @@ def test_a_record_goes_on_behind_what_a_stored_trial_has_counted():
     assert (record.recoveries, record.fallbacks, record.unwell_repeats) == (1, 2, 3)
     record.visit_ended()
     assert record.visits == 8
+
+
+def test_a_jump_says_by_which_way_of_the_menu_it_goes():
+    machine = machine_of(Scripted('aborted'))
+    assert machine.run() == 'done'
+    assert [event.data['way'] for event in machine.of(EventKind.JUMP)] == ['again']
