@@ -351,6 +351,7 @@ class OracleContainer(smach.StateMachine):
         node = self._oracle
         lock = self._state_transitioning_lock
         engine, records, history = node.engine, node.records, node.records.history
+        abandoned = node.tree.workers.abandoned
         states, transitions_of, remappings = self._states, self._transitions, self._remappings
         constants_of = self._constants.get
         # a machine that runs has a current state, with its label and its transitions
@@ -386,7 +387,7 @@ class OracleContainer(smach.StateMachine):
                 try:
                     if constants:
                         write_constants(userdata, constants)
-                    if record.special or node.tree.workers.abandoned:
+                    if record.special or abandoned:
                         outcome = execute_watched(node, record, state, view.remapper)
                     elif observed:
                         outcome = execute_observed(node, record, state, view.remapper)

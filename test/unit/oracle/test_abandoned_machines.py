@@ -295,7 +295,7 @@ def by_pickle(machine):
 @pytest.mark.parametrize('copied', [copy.deepcopy, by_pickle])
 def test_a_machine_of_which_a_state_was_left_behind_can_be_copied(copied, label, made):
     HERE.clear()
-    settings = {'states': {label: {'time_limit_s': 0.05, 'grace_period_s': 0.0}}}
+    settings = {'states': {label: {'time_limit_s': 0.5, 'grace_period_s': 0.0}}}
     machine = made(Stays())
     OracleContainer.wrap(machine, settings=settings, expert=FakeExpert(supersede('done')))
     assert machine.execute() == 'done'

@@ -133,6 +133,7 @@ class IteratorWrapper(ContainerWrapper):
         return dict(
             super().__getstate__(),
             tracked=None,
+            goes_on=False,
             _ended_with=None,
             _is_asked_to_go_on=False,
             _given={},

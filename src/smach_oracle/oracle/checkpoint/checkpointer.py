@@ -118,7 +118,8 @@ class Checkpointer:
         self._items = {path: told.item for path, told in before.containers.items() if told.item}
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
-        self._wrappers_around = functools.lru_cache()(wrappers_around)  # most events ask it
+        # most events ask it
+        self._wrappers_around = functools.lru_cache(None)(wrappers_around)
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
@@ -137,6 +138,7 @@ class Checkpointer:
         if event.kind is EventKind.OPERATOR_COMMAND:
             spent = tuple(self._spent())  # such as that it is paused, which must not be delayed
             if spent or event.seq >= self._seq_stored + SEQ_RESERVE:
+                self._seq_stored = event.seq
                 self._writer.commit(
                     NewMoment(
                         event.wall_time, event.seq, event.kind.name, self._top.key, '', spent

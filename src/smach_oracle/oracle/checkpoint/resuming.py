@@ -239,7 +239,7 @@ def let_repeat(top: TreeNode, paths: Sequence[str], by_command: Optional[Sequenc
     :raises SettingsError: for a state of the settings that is not there.
     """
     for path in [*paths, *(by_command or ())]:
-        place = place_named(top, path)
+        place = place_named(top, path, at_rest=True)
         if place is None and path in paths:
             raise SettingsError(
                 GROUPS.key_of('resume_repeat'),

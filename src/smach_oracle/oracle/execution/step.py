@@ -126,7 +126,12 @@ class Step:
             result = VisitResult.PREEMPTED if is_stopped else VisitResult.SUCCESS
             node.records.visit_ended(record, outcome, result)
             failing, listed = node.in_force.failing, record.settings.failure_outcomes
-            may_fail = outcome in failing or outcome in listed or judged.target in failing
+            may_fail = (
+                outcome in failing
+                or outcome in listed
+                # a state may have the name of a failing outcome
+                or (not judged.is_state and judged.target in failing)
+            )
             learn = result is VisitResult.SUCCESS and not may_fail
             facts = self._facts_of_stop(outcome) if stopping else NO_FACTS
             return self._advance(outcome, judged, learn, facts)

@@ -58,8 +58,11 @@ class ContainerLink(NamedTuple):
 
 
 def links_to(node: TreeNode) -> Iterator[ContainerLink]:
-    """Yield the links from the wrapped container above one, which is there, to it."""
-    outer: smach.Container = cast(TreeNode, node.parent).machine
+    """Yield the links from the wrapped container above one to it, from above to below.
+
+    A top machine has none, such as that of another tree in which a machine lies, too.
+    """
+    outer: smach.Container = (node.parent or node).machine
     for label in node.labels_from_parent:
         inner = cast(smach.Container, children_of(outer)[label])
         yield ContainerLink(outer, label, inner)
@@ -74,7 +77,8 @@ def levels_above(node: TreeNode) -> Iterator[TreeNode]:
     child, above = node, node.parent
     while above is not None and is_executing(above.machine):
         state = states_of(above.machine).get(child.labels_from_parent[0])
-        if current_state_of(above.machine) is not state:
+        # a termination callback may take a state away, and execute it
+        if state is None or current_state_of(above.machine) is not state:
             return
         yield above
         child, above = above, above.parent

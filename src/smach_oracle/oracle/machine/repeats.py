@@ -94,7 +94,9 @@ def _reached_from(node: TreeNode, target: str) -> Set[str]:
         reached.add(label)
         following = set(transitions_of(node.machine).get(label, {}).values())
         states = states_of(node.machine)
-        waiting.update(each for each in following - reached if each in states)
+        waiting.update(
+            each for each in following - reached if each in states and not node.is_oracle(each)
+        )
     return reached
 
 

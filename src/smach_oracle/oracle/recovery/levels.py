@@ -74,7 +74,7 @@ def foreseen_above(
             )
         label = node.labels_from_parent[0]
         route, kind = judged_at(above, label, outcome)
-        if kind is FailureKind.NOT_A_FAILURE:
+        if kind is FailureKind.NOT_A_FAILURE or not route.target:
             return None
         if author_recovers(outcome, route, kind, above.settings_of(label)):
             return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))
@@ -186,12 +186,15 @@ def _decide_above(
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
-    place = None if above.jump_path is None else above.jump_path.entered_places[-1]
-    way = jump_path_to(below, place)
+    way = (
+        jump_path_to(below, above.jump_path.entered_places[-1])
+        if above.jump_path is not None
+        else None
+    )
     if recovery.is_over():  # by a preempt while its preconditions ran
         record.take_back_failure()
         return None
-    if way is None:
+    if above.jump_path is None or way is None:
         record.take_back_failure()
         recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
         return None
@@ -199,7 +202,7 @@ def _decide_above(
     tell_failure(level, record, failure, continuous, reading)
     sentence = tell_decision(above, decided)
     record.recoveries += 1
-    kept, restarts = way.kept(above.watch), facts.action is Action.RESTART
+    kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
     jump = JumpTo(way, '', sentence, kept, level, restarts, above.chosen)
     return jump, facts.wait_s
 

@@ -6,6 +6,7 @@ import shutil
 import time
 
 import pytest
+from held_machines import eventually
 from killed_machines import Diary, KilledMachine, Noted, Points, around, in_a_process
 from killed_trees import ENDS, flat, make
 from left_stores import Left
@@ -39,6 +40,11 @@ def without(build, label, path=()):
 def trials_of(killed):
     with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
         return [each.outcome for each in store.trials('TOP')]
+
+
+def moments_of(killed, kind):
+    with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
+        return [each for each in store.moments(1) if each.kind == kind]
 
 
 # -- sent by hand, and the script changes then
@@ -390,6 +396,7 @@ def test_after_many_commands_of_an_operator_no_number_comes_again(tmp_path):
                 diary.write('begins', 'A')
                 for _ in range(1200):
                     OperatorHand(machine).set_breakpoint('C')
+                eventually(lambda: moments_of(killed, 'OPERATOR_COMMAND'))
                 os.kill(os.getpid(), 9)
 
         machine = flat(diary, points)
@@ -398,6 +405,7 @@ def test_after_many_commands_of_an_operator_no_number_comes_again(tmp_path):
 
     killed = KilledMachine(tmp_path, commanded)
     assert killed.run() is None
+    assert len(moments_of(killed, 'OPERATOR_COMMAND')) == 1
     assert killed.run()['events'][0][1] > 1200
 
 
