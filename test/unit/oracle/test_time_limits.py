@@ -430,20 +430,20 @@ def test_a_precondition_whose_thread_lives_has_not_begun(clock):
 
     def let_it_end(question, cancelled, progress):
         state.leave()
-        assert wait_for(lambda: 'worker of A' not in str(threading.enumerate()))
+        assert wait_for(lambda: 'worker of WAITS' not in str(threading.enumerate()))
         return supersede('ok')
 
     clock.end(2, state.stuck)
     machine = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
     with machine:
-        smach.StateMachine.add('A', state, {'ok': 'done'})
+        smach.StateMachine.add('WAITS', state, {'ok': 'done'})
         smach.StateMachine.add('B', Scripted('aborted'), {'ok': 'TWIN'})
         smach.StateMachine.add('TWIN', state, {'ok': 'done'})
     machine = Watched(
         machine,
         expert=FakeExpert(goto('B'), let_it_end),
         preconditions={'B': ['TWIN']},
-        settings={'states': {'A': ABANDONING, 'TWIN': {'on_retry': 'confirm'}}},
+        settings={'states': {'WAITS': ABANDONING, 'TWIN': {'on_retry': 'confirm'}}},
     )
     assert machine.run() == 'done'
-    assert machine.visits() == ['A', 'B', 'TWIN'] and state.runs == 2
+    assert machine.visits() == ['WAITS', 'B', 'TWIN'] and state.runs == 2

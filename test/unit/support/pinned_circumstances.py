@@ -20,7 +20,7 @@ if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
 from pinned import FOLDER
-from pinned_trees import Operated, Told, digests, killed, name_of, plan_of
+from pinned_trees import Told, digests, killed, name_of, plan_of
 from tree_model.plan import machines_of
 
 from smach_oracle.oracle import OracleContainer
@@ -30,7 +30,7 @@ from smach_oracle.oracle.machine import health_watch
 from smach_oracle.oracle.machine.oracle import oracle_of
 from smach_oracle.oracle.prospects import prospects_of
 
-TREES, KILLED = 80, 60
+TREES, KILLED = 80, 40
 FIRST = 1000  # other plans than those of pinned_trees.py
 TRIALS = 4
 UNWELL_EVERY_S = (20.0, 90.0, 400.0)
@@ -208,12 +208,8 @@ def tell(number: int, folder: Path) -> List[str]:
 
 
 def tell_killed(number: int, folder: Path) -> List[str]:
-    """Return what is stored of such a tree that is killed, and told by one that goes on.
-
-    Every second has an operator instead.
-    """
-    operated = partial(Operated, plan_of(FIRST + number))
-    return killed(operated if number % 2 else partial(Circumstances, number), number, folder)
+    """Return what is stored of such a tree that is killed, and told by one that goes on."""
+    return killed(partial(Circumstances, number), number, folder)
 
 
 def all_told() -> Iterator[Tuple[str, List[str]]]:

@@ -139,8 +139,8 @@ class Operated(Told):
     moments each time. What waits is let go in the end.
     """
 
-    def __init__(self, plan: TreePlan, **settings: Any) -> None:
-        super().__init__(plan, **settings)
+    def __init__(self, plan: TreePlan) -> None:
+        super().__init__(plan)
         self._hand = OperatorHand(self.machine)
         self._chance = random.Random(plan.seed + ' operated')
         nodes = nodes_of(self.machine)
