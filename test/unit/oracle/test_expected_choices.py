@@ -143,3 +143,12 @@ def test_a_choice_has_the_minutes_of_the_way_that_leads_there(clock):
     assert machine.run() == 'done'
     told = {label: each.minutes for label, each in choices(expert.questions[0]).items()}
     assert told == {'B': 0.5, 'A': 1.0, 'C': 0.0}
+
+
+def test_what_the_policy_has_repeated_counts_for_the_choice_of_the_failed_state():
+    fails = ['aborted', 'ok'] * 2 + FAILS
+    machine, expert = asking(supersede('ok'), fails=fails, max_recoveries=1)
+    for _ in range(3):
+        assert machine.run() == 'done'
+    told = choices(expert.questions[-1])['C']
+    assert told.helped == 2 and told.tried >= 2

@@ -6,6 +6,10 @@ from machines import Scripted, watched
 import smach
 from smach_oracle.oracle.records.events import NO_OUTCOME, Event, EventKind
 from smach_oracle.oracle.records.facts import (
+    LEFT,
+    PASSED_BY,
+    STOPPING,
+    UNCOUNTED,
     Decider,
     TrialEnd,
     branches_of,
@@ -123,3 +127,8 @@ def test_what_is_stated_counts_more_than_words():
 def test_the_start_of_a_container_names_its_branches(data, branches):
     event = Event(EventKind.CONTAINER_START, 'trial', 9, 0.0, 'TOP/BOTH', data=data)
     assert branches_of(event) == branches
+
+
+@pytest.mark.parametrize('fields', [UNCOUNTED, LEFT, STOPPING, PASSED_BY])
+def test_bags_say_by_a_word_of_their_own_what_is_not_counted(fields):
+    assert fields['data'] == {'not_counted': True}

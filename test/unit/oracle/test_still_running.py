@@ -77,6 +77,18 @@ def test_a_person_is_asked_in_plain_words_and_the_state_runs_on(log):
     assert any(level == 'warn' and said in text for level, text in log)
 
 
+def test_a_state_that_a_person_takes_out_is_preempted():
+    heard = []
+
+    def works(state, ud):
+        heard.append(wait_for(state.preempt_requested, 20.0))
+        return 'preempted'
+
+    machine = asked(Scripted('aborted', works), Scripted(), expert=FakeExpert(goto('B')))
+    assert machine.run() == 'done'
+    assert heard == [True]
+
+
 def test_who_waits_on_is_asked_again_after_twice_the_time():
     gate = Gate()
     expert = FakeExpert(goto('A'), goto('A'), letting_go(gate, None))
