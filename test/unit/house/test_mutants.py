@@ -195,8 +195,12 @@ class Below(Above):
     def __init__(self):
         super().__init__()
 """
+OTHER = """
+def other():
+    return 17
+"""
 TEST = """
-import m, pytest, tempfile, threading
+import m, other, pytest, tempfile, threading
 
 def test_at_least():
     assert m.at_least(2, 1) and not m.at_least(1, 2)
@@ -238,6 +242,9 @@ def test_below():
     KEPT.append(tempfile.TemporaryDirectory())
     assert m.Below().made
 
+def test_both():
+    assert other.other() == 17 and m.doubled(1) == 2
+
 def test_waits():
     event = threading.Event()
     event.set()
@@ -257,8 +264,9 @@ def workshop(tmp_path, monkeypatch):
     temporary.mkdir()
     monkeypatch.setenv('TMPDIR', str(temporary))
     root = tmp_path / 'tree'
-    for name, text in ((CODE + '/m.py', MODULE), (CHECKS + '/test_m.py', TEST)):
-        (root / name).parent.mkdir(parents=True)
+    texts = {CODE + '/m.py': MODULE, CODE + '/other.py': OTHER, CHECKS + '/test_m.py': TEST}
+    for name, text in texts.items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
         (root / name).write_text(text)
     project = trying.Project(root, CODE, CHECKS)
     return project, trying.Workshop(project, tmp_path, 1)
@@ -315,6 +323,15 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
     assert {path: path.read_text() for path in project.root.rglob('*.*')} == before
     assert processes_of(project.root.parent) == []
     assert os.listdir(os.environ['TMPDIR']) == [], 'what a fork has made is left'
+
+
+@pytest.mark.parametrize('first', ['(17 + 1)', '(a / 2)'])
+def test_no_mutant_sees_one_of_another_module_that_was_tried_before(workshop, first):
+    project, shop = workshop
+    mutants = [each for each in project.mutants() if each.after in ('(17 + 1)', '(a / 2)')]
+    mutants.sort(key=lambda each: each.after != first)
+    reaches = [each for each in reaches_of(shop) if 'both' in each.test]
+    assert [trial.verdict for trial in shop.try_all(mutants, reaches)] == ['killed'] * 2
 
 
 def test_a_mutant_that_collects_without_end_has_the_memory_of_one_test(workshop):

@@ -142,10 +142,9 @@ class Copy:
 
     def run_changed(self, module: Path, tests: Sequence[str], limit_s: float) -> Ending:
         """Run tests with the change of a module that is on the disk, as `run` does, and quickly
-        where the change is in functions that have not run on import.
+        where the change is in functions that have not run on import. `collect` comes before.
         """
-        if self._collected is None:
-            self._collected = Collected(self._collect, self._beside('collected'))
+        assert self._collected is not None
         ending = self._collected.run(module, tests, limit_s)
         if ending is not None:
             return ending
@@ -154,6 +153,14 @@ class Copy:
         except TestsNotRun:  # the module does not load, or its tests have other names
             files = sorted({test.split('::')[0] for test in tests})
             return self.run(files, MEASURING_S, {})
+
+    def collect(self) -> None:
+        """Hold all tests collected from now on. Nothing may be changed yet: all runs see it.
+
+        :raises TestsNotRun: where pytest ends before it has collected.
+        """
+        if self._collected is None:
+            self._collected = Collected(self._collect, self._beside('collected'))
 
     def _collect(self, env: Dict[str, str]) -> str:
         """Hold the tests for `_collected`. Return what went wrong in the end."""

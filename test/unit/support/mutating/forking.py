@@ -58,9 +58,9 @@ def pytest_runtestloop(session: pytest.Session) -> bool:
     """Answer until nobody asks any more."""
     if session.testsfailed:
         raise session.Interrupted('a file of tests was not collected')
+    forks = Forks(session)  # who is connected may change a file
     with socket.socket(socket.AF_UNIX) as asking:
         asking.connect(os.environ[ASKED_BY])
-        forks = Forks(session)
         with asking.makefile('rw') as lines:
             for line in lines:
                 print(json.dumps(forks.answer(**json.loads(line))), file=lines, flush=True)

@@ -133,6 +133,7 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
     path = copy.folder / below / mutant.module
     original = path.read_text('utf-8')
     took_s = 0.0
+    copy.collect()
     try:
         for run in _in_runs(tests):
             path.write_text(mutant.applied(original), 'utf-8')
