@@ -234,9 +234,10 @@ class Recovery:
 
     def when_well(self, verdict: Verdict) -> Verdict:
         """Return a verdict, after a wait where it leads to a state and the robot is not well."""
-        if not isinstance(verdict, JumpTo):
+        health = self.node.tree.health
+        if not (health.is_set and isinstance(verdict, JumpTo)):
             return verdict
-        why = self.node.tree.health.why_unwell(self.scope)
+        why = health.why_unwell(self.scope)
         if why and not self.wait_until_well(
             'is left for ' + verdict.jump_path.entered_places[-1].label, why
         ):
