@@ -95,7 +95,8 @@ def test_a_failure_deep_in_a_tree_starts_the_top_machine_over():
     assert machine.decisions() == [('restart', 'TOP/FIRST')] * 2
 
 
-def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
+def writing():
+    """What a state finds under `note`, and the state, which writes there."""
     seen = []
 
     def write(state, ud):
@@ -103,7 +104,12 @@ def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
         ud.note = 'used'
         return 'ok'
 
-    inner = chain_of(Scripted(write, write, input_keys=['note'], output_keys=['note']))
+    return seen, Scripted(write, write, input_keys=['note'], output_keys=['note'])
+
+
+def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
+    seen, writes = writing()
+    inner = chain_of(writes)
     inner.userdata.note = 'clean'
     machine = Watched(nested(inner, after=Scripted('aborted')), settings={'policy': 'restart'})
     assert machine.run() == 'done'
@@ -111,15 +117,8 @@ def test_a_restart_puts_the_userdata_of_nested_machines_back_too():
 
 
 def test_a_machine_that_has_run_since_does_not_change_the_userdata_of_the_start():
-    seen = []
-
-    def write(state, ud):
-        seen.append(ud.note)
-        ud.note = 'used'
-        return 'ok'
-
-    before = Scripted(write, write, input_keys=['note'], output_keys=['note'])
-    top = nested(chain_of(Scripted()), before, Scripted('aborted'))
+    seen, writes = writing()
+    top = nested(chain_of(Scripted()), writes, Scripted('aborted'))
     top.userdata.note = 'clean'
     assert Watched(top, settings={'policy': 'restart'}).run() == 'done'
     assert seen == ['clean', 'clean']

@@ -19,8 +19,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import FOLDER
-from pinned_trees import Told, digests, killed, name_of, plan_of
+from pinned_trees import Told, killed, name_of, plan_of, write_trees
 from tree_model.plan import machines_of
 
 from smach_oracle.oracle import OracleContainer
@@ -222,14 +221,7 @@ def all_told() -> Iterator[Tuple[str, List[str]]]:
 
 def write(folder: Path, pins: bool) -> None:
     """Write what all trees tell, a file each. `pins`: the digests, too."""
-    folder.mkdir(exist_ok=True)
-    told = dict(all_told())
-    for name, lines in told.items():
-        (folder / (name + '.txt')).write_text('\n'.join(lines) + '\n', 'utf-8')
-    if pins:
-        (FOLDER / 'circumstances.txt').write_text(
-            ''.join('{} {}\n'.format(name, digests(lines)) for name, lines in told.items()), 'utf-8'
-        )
+    write_trees('circumstances', dict(all_told()), folder, pins)
 
 
 if __name__ == '__main__':

@@ -19,8 +19,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == '__main__':
     sys.path[:0] = [str(HERE), str(HERE.parents[2] / 'src')]
 
-from pinned import FOLDER
-from pinned_trees import BESIDE, IN_ORDER, Operated, digests, is_beside, name_of, plan_of
+from pinned_trees import BESIDE, IN_ORDER, Operated, is_beside, name_of, plan_of, write_trees
 from tree_model.building import Scripted
 from tree_model.plan import TOP, Leaf, Machine, Repeated, TreePlan, children_of, nodes_below
 
@@ -174,16 +173,10 @@ def tell_unobserved(number: int) -> List[str]:
 
 def write(folder: Path, pins: bool) -> None:
     """Write what all trees tell, a file each. `pins`: the digests, too."""
-    folder.mkdir(exist_ok=True)
     told = {name_of(number, 'stopped'): tell(number) for number in STOPPED}
     for number in UNOBSERVED:
         told[name_of(number, 'unobserved')] = tell_unobserved(number)
-    for name, lines in told.items():
-        (folder / (name + '.txt')).write_text('\n'.join(lines) + '\n', 'utf-8')
-    if pins:
-        (FOLDER / 'stops.txt').write_text(
-            ''.join('{} {}\n'.format(name, digests(lines)) for name, lines in told.items()), 'utf-8'
-        )
+    write_trees('stops', told, folder, pins)
 
 
 if __name__ == '__main__':

@@ -410,17 +410,22 @@ def digests(lines: List[str]) -> str:
 
 def write(folder: Path, pins: bool) -> None:
     """Write what all trees tell, a file each. `pins`: the digests, too."""
-    folder.mkdir(exist_ok=True)
     told = {name_of(number): tell(number) for number in range(TREES)}
     for number in range(OPERATED):
         told[name_of(number, 'operated')] = tell_operated(number)
     for number in range(KILLED):
         with tempfile.TemporaryDirectory() as store:
             told[name_of(number, 'killed')] = tell_killed(number, Path(store))
+    write_trees('trees', told, folder, pins)
+
+
+def write_trees(what: str, told: Dict[str, List[str]], folder: Path, pins: bool) -> None:
+    """Write what trees tell to a folder, a file each. `pins`: the digests of each, too."""
+    folder.mkdir(exist_ok=True)
     for name, lines in told.items():
         (folder / (name + '.txt')).write_text('\n'.join(lines) + '\n', 'utf-8')
     if pins:
-        (FOLDER / 'trees.txt').write_text(
+        (FOLDER / (what + '.txt')).write_text(
             ''.join('{} {}\n'.format(name, digests(lines)) for name, lines in told.items()), 'utf-8'
         )
 
