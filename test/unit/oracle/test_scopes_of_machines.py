@@ -79,6 +79,35 @@ def test_a_hold_between_two_items(never_looks):
         assert not machine.running(), 'nobody has woken it'
 
 
+def test_a_hold_in_a_branch_that_another_branch_ends(never_looks):
+    begun, held = threading.Event(), threading.Event()
+
+    def is_held_afterwards(state, ud):
+        assert begun.wait(SOON_S)
+        machine.hand.pause()
+        return 'aborted'
+
+    def ends_all(state, ud):
+        begun.set()
+        assert held.wait(SOON_S)
+        return 'ok'
+
+    both = smach.Concurrence(
+        outcomes=['done'], default_outcome='done', child_termination_cb=lambda outcomes: True
+    )
+    with both:
+        smach.Concurrence.add('A', Scripted(is_held_afterwards))
+        smach.Concurrence.add('B', Scripted(ends_all))
+    machine = Held(around('BOTH', both))
+    machine.machine.events.observers.append(
+        lambda event: held.set() if event.kind is EventKind.HOLD_START else None
+    )
+    with machine.begin():
+        machine._thread.join(SOON_S)
+        assert not machine.running(), 'nobody has woken it'
+    assert [event.outcome for event in machine.of(EventKind.HOLD_END)] == ['preempted']
+
+
 def test_an_open_question(never_looks):
     def ask(question, cancelled, progress):
         assert cancelled.wait(SOON_S)
