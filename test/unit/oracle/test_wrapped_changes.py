@@ -298,6 +298,20 @@ def test_what_was_learned_stays_under_other_settings():
     assert (row.successes, row.failures) == (1, 1)
 
 
+def test_what_a_machine_learned_below_one_stays_below_another_that_is_wrapped_again():
+    inner, first, other = chain_of(Scripted(*['aborted'] * 9)), chain_of(), chain_of()
+    settings = {'memory': 50, 'max_recoveries': 50}
+    with first:
+        smach.StateMachine.add('INNER', inner, {'done': 'done'})
+    assert OracleContainer.wrap(first, settings=settings).execute() == 'done'
+    rate = first.rates()[-1].rate
+    OracleContainer.wrap(other, settings={'memory': 3})
+    with other:
+        smach.StateMachine.add('INNER', inner, {'done': 'done'})
+    OracleContainer.wrap(other, settings=settings)
+    assert other.rates()[-1].rate == rate
+
+
 def test_a_jump_into_a_machine_arrives_though_it_was_wrapped_again_on_the_way():
     def wrap_again(event):
         if event.kind is EventKind.JUMP:
