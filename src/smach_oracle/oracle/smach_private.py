@@ -273,8 +273,7 @@ class EngineProbe:
     """
 
     def __init__(self) -> None:
-        self.stepped = False
-        self.attentive = True
+        self.begin_execution()
 
     def ring(self) -> None:
         """Look closely from now on: a state around the machine was abandoned."""

@@ -92,11 +92,9 @@ class History:
             self.visits.added = added
 
     def count_visits(self) -> None:
-        """Know from now on how many visits this execution has had."""
+        """Know from now on how many visits this execution has had, which begins."""
         if not isinstance(self.visits, _CountedVisits):
-            counted = _CountedVisits(self.visits, maxlen=self.visits.maxlen)
-            counted.added = len(counted)
-            self.visits = counted
+            self.visits = _CountedVisits(self.visits, maxlen=self.visits.maxlen)
 
     @property
     def visits_of_execution(self) -> int:
