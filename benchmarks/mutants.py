@@ -6,10 +6,10 @@
 
 Each mutant is one change of one expression or statement in src/smach_oracle/oracle, such as `<`
 made `<=`, a condition turned around, or a call left out. A mutant is killed if a test in
-test/unit/oracle fails twice, or does not end. Only the tests that reach its statement run, quick
-ones first. The mutants that survive are shown, each with its name, which --only takes. Those
-in mutants_equivalent.csv change nothing that anybody sees, for the reason given there, and are
-not counted. The exit status is 1 where fewer than 95% of the others are killed.
+test/unit/oracle fails twice, or does not end. Only the tests that reach its statement run, the
+likeliest to see it first. The mutants that survive are shown, each with its name, which --only
+takes. Those in mutants_equivalent.csv change nothing that anybody sees, for the reason given there,
+and are not counted. The exit status is 1 where fewer than 95% of the others are killed.
 
 It takes seconds to minutes for each mutant, so it is a command for a weekly job. It changes copies
 of the tree alone, and needs Debian's python3-coverage.

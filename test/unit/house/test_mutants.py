@@ -334,6 +334,23 @@ def test_no_mutant_sees_one_of_another_module_that_was_tried_before(workshop, fi
     assert [trial.verdict for trial in shop.try_all(mutants, reaches)] == ['killed'] * 2
 
 
+def test_each_test_runs_once_those_of_the_files_that_a_mutant_concerns_first():
+    of_subject = [trying.Reach('test_it.py::{}'.format(n), set(), 0.1) for n in range(40)]
+    of_others = [trying.Reach('test_all.py::{}'.format(n), set(), 0.1) for n in range(200)]
+    quick = [trying.Reach('test_quick.py::{}'.format(n), set(), 0.01) for n in range(trying.FEW)]
+    slow = [trying.Reach('test_slow.py', set(), 100.0)]
+    tests = of_others + slow + of_subject + quick
+    of_files = {'test_it.py': 50, 'test_all.py': 3000, 'test_quick.py': 500, 'test_slow.py': 1}
+    runs = list(trying._in_runs(tests, of_files))
+    assert sorted(sum(runs, [])) == sorted(tests)
+    assert runs[0] == sorted(quick) and {each.file for each in runs[1]} == {
+        'test_it.py',
+        'test_all.py',
+    }
+    assert sum(each.file == 'test_it.py' for each in runs[1]) == trying.FEW
+    assert slow[0] in runs[2]
+
+
 def test_a_mutant_that_collects_without_end_has_the_memory_of_one_test(workshop):
     project, shop = workshop
     (endless,) = [

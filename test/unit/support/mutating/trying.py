@@ -6,10 +6,12 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import (
     Callable,
+    DefaultDict,
     Dict,
     Generator,
     Iterator,
     List,
+    Mapping,
     NamedTuple,
     Sequence,
     Tuple,
@@ -24,7 +26,9 @@ from .mutations import Mutant, mutants_of
 
 ATTEMPTS = 3  # of tests that should pass, on a machine that does other work, too
 SPARE_S, SLOWER = 60.0, 4.0  # tests that take longer than this hang
-FEW = 25  # tests of the first run. Each further run has as many times more
+FEW = 25  # tests of the first run, and of a file among the first
+RUN_S = 4.0  # that the tests of the second run take, at least; of each further one twice as long
+START_S = 0.3  # that a run of few tests takes beside them
 
 Item = TypeVar('Item')
 Found = TypeVar('Found')
@@ -130,12 +134,13 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
     first, last = mutant.statement
     wanted = {(mutant.module, line) for line in range(first, last + 1)}
     tests = [each for each in reaches if each.lines & wanted]
+    of_files = collections.Counter(each.file for each in reaches)
     path = copy.folder / below / mutant.module
     original = path.read_text('utf-8')
     took_s = 0.0
     copy.collect()
     try:
-        for run in _in_runs(tests):
+        for run in _in_runs(tests, of_files):
             path.write_text(mutant.applied(original), 'utf-8')
             verdict, by, run_s = _verdict_of(copy, path, run)
             took_s += run_s
@@ -148,19 +153,41 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
     return Trial(mutant, 'survived' if tests else 'unreached', '', len(tests), took_s)
 
 
-def _in_runs(tests: List[Reach]) -> Iterator[List[Reach]]:
-    """Yield the tests in runs. The quickest of each file come first: they kill most mutants."""
-    before: Dict[str, int] = collections.Counter()
-    ranked = []
-    for each in sorted(tests, key=lambda each: each.took_s):
-        before[each.file] += 1
-        ranked.append((before[each.file], each))
-    ranked.sort(key=lambda pair: pair[0])
-    begin, size = 0, FEW
-    while begin < len(ranked):
-        # those of a file one after the other, for what they share
-        yield sorted(each for _, each in ranked[begin : begin + size])
-        begin, size = begin + size, size * FEW
+def _in_runs(tests: List[Reach], of_files: Mapping[str, int]) -> Iterator[List[Reach]]:
+    """Yield the tests in runs, those first that are the most likely to see a fault.
+
+    These are the quickest of all, and then those of files of which the largest part comes to the
+    statement, in little time. Of a file with many tests only its quickest come so early.
+
+    :param of_files: the number of tests of each file.
+    """
+    quickest = sorted(tests, key=lambda each: each.took_s)
+    yield sorted(quickest[:FEW])
+    reaching = collections.Counter(each.file for each in tests)
+    parts: DefaultDict[Tuple[str, int], List[Reach]] = collections.defaultdict(list)
+    seen: Dict[str, int] = collections.Counter()
+    for each in quickest[FEW:]:
+        parts[each.file, seen[each.file] // FEW].append(each)
+        seen[each.file] += 1
+
+    def rank(part: Tuple[str, int]) -> Tuple[int, float]:
+        file, number = part
+        share = reaching[file] / of_files[file]
+        return number, -share / (START_S + _took_s(parts[part]))
+
+    run: List[Reach] = []
+    least_s = RUN_S
+    for part in sorted(parts, key=rank):
+        run += parts[part]
+        if _took_s(run) > least_s:
+            yield sorted(run)
+            run, least_s = [], 2 * least_s
+    if run:
+        yield sorted(run)
+
+
+def _took_s(tests: Sequence[Reach]) -> float:
+    return sum(each.took_s for each in tests)
 
 
 def _up_to(last: str, tests: List[Reach]) -> List[Reach]:
@@ -174,7 +201,7 @@ def _verdict_of(copy: Copy, module: Path, tests: Sequence[Reach]) -> Tuple[str, 
 
     What fails once and then passes has failed for another reason.
     """
-    limit_s = SPARE_S + SLOWER * sum(each.took_s for each in tests)
+    limit_s = SPARE_S + SLOWER * _took_s(tests)
     named = [each.test for each in tests]
     took_s, failed = 0.0, 0
     for _ in range(ATTEMPTS):
