@@ -232,17 +232,15 @@ class Recovery:
         """Go to a place, once the robot is well."""
         return self.when_well(JumpTo(way, text=text, written=way.kept(self.watch)))
 
-    def when_well(self, verdict: Verdict) -> Verdict:
-        """Return a verdict, after a wait where it leads to a state and the robot is not well."""
+    def when_well(self, jump: JumpTo) -> Verdict:
+        """Return a jump, after a wait where the robot is not well."""
         health = self.node.tree.health
-        if not (health.is_set and isinstance(verdict, JumpTo)):
-            return verdict
-        why = health.why_unwell(self.scope)
+        why = health.why_unwell(self.scope) if health.is_set else ''
         if why and not self.wait_until_well(
-            'is left for ' + verdict.jump_path.entered_places[-1].label, why
+            'is left for ' + jump.jump_path.entered_places[-1].label, why
         ):
             return self.end_early()
-        return verdict
+        return jump
 
     def natural_ending(self) -> ContainerEnding:
         """Return how the failure would have ended the container."""
