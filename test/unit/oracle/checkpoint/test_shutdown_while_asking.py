@@ -6,12 +6,14 @@ import threading
 import pytest
 from killed_machines import KilledMachine, Noted, around
 from killed_trees import ENDS, flat
+from machines import FakeExpert, Scripted, watched
 from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import Expert, oracle_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.operator_hand import OperatorHand
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.store.store_file import StoreFile
 
 ASKS = {'max_recoveries': 0}
@@ -111,6 +113,20 @@ def test_the_question_is_open_again_under_its_id(tmp_path, how, on_resume):
     ids = [each for each, _ in task.questions()]
     assert ids[0] == ids[1] != ids[2]
     assert task.trial().outcome == 'succeeded'
+
+
+def test_the_question_is_told_to_be_taken_back_by_the_shutdown(tmp_path, monkeypatch):
+    def ask(question, cancelled, progress):
+        monkeypatch.setattr(smach, 'is_shutdown', lambda: True)
+        assert cancelled.wait(20)
+
+    machine = watched(
+        Scripted('aborted'),
+        expert=FakeExpert(ask),
+        settings=dict(ASKS, checkpoint=str(tmp_path / 'robot.db')),
+    )
+    assert machine.run() is None
+    assert [event.text for event in machine.of(EventKind.QUERY_CANCELLED)] == ['shutdown']
 
 
 def test_a_person_who_preempts_it_ends_the_trial(tmp_path):
