@@ -109,3 +109,22 @@ def test_of_a_failure_that_is_forgotten_the_visits_say_what_came_before():
     assert _context_then(node, record, before).succeeded_before == 'LOOK'
     assert _context_then(node, record, before[2:]).succeeded_before is None
     assert _context_then(node, record, before).unconditioned == 'REPORT'
+
+
+def test_nothing_is_reported_where_a_stop_was_obeyed():
+    """The author goes on from the stop, and ends with what would report the failure of WORK."""
+    call = Scripted(
+        lambda state, ud: machine.machine.request_preempt() or 'called',
+        outcomes=('called', 'preempted'),
+    )
+    stow = Scripted(outcomes=('stowed', 'preempted'))
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        between=[
+            ('CALL', call, {'called': 'STOW', 'preempted': 'STOW'}),
+            ('STOW', stow, {'stowed': 'REPORT', 'preempted': 'REPORT'}),
+        ],
+    )
+    assert machine.run() == 'failed'
+    assert machine.visits() == ['LOOK', 'WORK', 'CALL', 'STOW', 'REPORT']
+    assert not machine.of(EventKind.DECISION)

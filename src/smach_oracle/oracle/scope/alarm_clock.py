@@ -54,7 +54,6 @@ class AlarmClock:
 
     def _run(self) -> None:
         while True:
-            self._bell.hush()  # before the look: what comes after that rings it again
             with self._lock:
                 if not self._due_s:
                     self._thread = None

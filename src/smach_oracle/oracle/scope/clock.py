@@ -27,12 +27,11 @@ class Bell:
         except RuntimeError:
             pass  # it has been rung, and nobody has heard it yet
 
-    def hush(self) -> None:
-        """Forget that it was rung."""
-        self._silence.acquire(blocking=False)
-
     def wait(self, seconds: float) -> None:
-        """Wait until it is rung, at most so long."""
+        """Wait until it is rung, at most so long. Where it was rung before, it does not wait.
+
+        Who waits looks afterwards at what may have changed, and then waits for the next ring.
+        """
         self._silence.acquire(timeout=min(seconds, threading.TIMEOUT_MAX))
 
 

@@ -170,7 +170,6 @@ class Scope:
             until.bells.add(bell)
         try:
             while True:
-                bell.hush()  # before the look: what comes after that rings it again
                 if until is not None and until.is_set():
                     return True
                 if self.reason is not None:
