@@ -113,10 +113,13 @@ def test_of_a_failure_that_is_forgotten_the_visits_say_what_came_before():
 
 def test_nothing_is_reported_where_a_stop_was_obeyed():
     """The author goes on from the stop, and ends with what would report the failure of WORK."""
-    call = Scripted(
-        lambda state, ud: machine.machine.request_preempt() or 'called',
-        outcomes=('called', 'preempted'),
-    )
+
+    def obeys(state, ud):
+        machine.machine.request_preempt()
+        state.service_preempt()
+        return 'preempted'
+
+    call = Scripted(obeys, outcomes=('called', 'preempted'))
     stow = Scripted(outcomes=('stowed', 'preempted'))
     machine = reporting(
         Scripted('failed', outcomes=BAD),
