@@ -131,3 +131,22 @@ def test_nothing_is_reported_where_a_stop_was_obeyed():
     assert machine.run() == 'failed'
     assert machine.visits() == ['LOOK', 'WORK', 'CALL', 'STOW', 'REPORT']
     assert not machine.of(EventKind.DECISION)
+
+
+def test_a_failure_that_keeps_coming_is_continuous_after_that_of_another_state():
+    machine = Watched(
+        made(
+            [
+                ('LOOK', Scripted('failed', outcomes=('seen', 'failed')), {'seen': 'WORK'}),
+                (
+                    'WORK',
+                    Scripted('failed', 'failed', outcomes=BAD),
+                    {'ok': 'done', 'failed': 'REPORT'},
+                ),
+                ('REPORT', Scripted(outcomes=('said',)), {'said': 'failed'}),
+            ]
+        ),
+        settings={'memory': 100},
+    )
+    assert machine.run() == 'done'
+    assert [event.continuous for event in machine.of(EventKind.DECISION)] == [False, False, True]
