@@ -68,7 +68,13 @@ def run_and_stop(machine, ends, before=lambda held: None, then=lambda held: None
 
 @pytest.mark.parametrize(
     'ends',
-    [Ends('preempted'), Ends('preempted', services=False), Ends('aborted'), Ends('stopped')],
+    [
+        Ends('preempted'),
+        Ends('preempted', services=False),
+        Ends('aborted'),
+        Ends('aborted', services=False),
+        Ends('stopped'),
+    ],
     ids=lambda ends: '{}{}'.format(ends.outcome, '' if ends.services else ', not serviced'),
 )
 def test_a_state_that_was_stopped_ends_the_work_by_whatever_outcome(ends):
