@@ -149,10 +149,7 @@ class Branch(smach.Container):
             ):
                 return self._run((outcome, None))
             edge.count += 1
-            history = node.records.history
-            history.visits.append(edge.visit)
-            if not record.has_preconditions:
-                history.unconditioned = record.label
+            node.records.history.visits.append(edge.visit)
             record.snapshot = None
             if self._item is None:
                 self._rest()
