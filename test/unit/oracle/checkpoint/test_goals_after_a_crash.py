@@ -6,6 +6,7 @@ import signal
 
 from killed_machines import KilledMachine, Noted
 from killed_trees import ENDS
+from test_never_twice import moment_of
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -68,6 +69,13 @@ def test_a_goal_that_runs_as_a_trial_begins_is_stored_too(tmp_path):
     assert killed.diary.count('ends') == {'lift of /torso': 1, 'reach of /arm': 1}
 
 
+def test_a_goal_that_was_sent_behind_the_moment_that_it_goes_on_from_is_ended_too(tmp_path):
+    killed = KilledMachine(tmp_path, sending)
+    assert killed.run() is None
+    assert killed.run(resume_from=moment_of(killed, 'STATE_START', 'A')) is None
+    assert killed.diary.count('ends') == {'reach of /arm': 1}
+
+
 def test_a_goal_that_has_ended_when_the_next_state_begins_is_forgotten(tmp_path):
     class EndsFirst(Noted):
         def execute(self, userdata):
@@ -113,3 +121,24 @@ def test_a_goal_is_stored_as_it_is_sent_and_once_it_has_ended(tmp_path):
                 ('GOAL', '"/camera"'),
                 ('TRIAL_END', None),
             ]
+
+
+def test_a_goal_that_runs_as_a_trial_begins_is_stored_until_it_has_ended(tmp_path):
+    def ends(userdata):
+        GOALS.end('lift')
+        return 'succeeded'
+
+    machine = smach.StateMachine(['succeeded'])
+    with machine:
+        for label, following in (('A', 'B'), ('B', 'succeeded')):
+            state = smach.CBState(ends, outcomes=['succeeded'])
+            smach.StateMachine.add(label, state, {'succeeded': following})
+    path = str(tmp_path / 'robot.db')
+    GOALS.keep('lift', '/torso')
+    OracleContainer.wrap(machine, settings={'checkpoint': path}).execute()
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        facts = [each for each in store.facts(1) if each.name == 'goal:lift']
+    assert [(each.kind, each.label, each.value.text) for each in facts] == [
+        ('TRIAL_START', '', '"/torso"'),
+        ('STATE_START', 'B', None),
+    ]

@@ -236,8 +236,9 @@ def beside_an_own(diary, points):
     return around('BOTH', both, ENDS)
 
 
-def test_a_concurrence_whose_branches_have_no_oracle_begins_again_as_a_whole(tmp_path):
-    left = Left(beside_an_own, tree={'nested': False})
+@pytest.mark.parametrize('nested', [False, ['BOTH/INNER']])
+def test_a_concurrence_whose_branches_have_no_oracle_begins_again_as_a_whole(tmp_path, nested):
+    left = Left(beside_an_own, tree={'nested': nested})
     killed = left.killed_at(left.first_in('Q'), tmp_path / 'killed')
     assert killed.run().get('outcome') == 'succeeded'
     assert killed.diary.count('begins')['P'] == killed.diary.count('begins')['Q'] == 2

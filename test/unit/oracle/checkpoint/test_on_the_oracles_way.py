@@ -1,7 +1,7 @@
 """Killed as the oracle checks and achieves preconditions and tries again, a machine goes on."""
 
 import pytest
-from killed_machines import Noted
+from killed_machines import Noted, around
 from left_stores import Left
 
 import smach
@@ -79,3 +79,22 @@ def test_what_a_precondition_has_written_is_kept_whatever_its_name(tmp_path):
     left = Left(build, states={'PICK': {'preconditions': build.preconditions}}, userdata='restore')
     killed = left.killed_at(left.first_in('CLEAR'), tmp_path / 'killed')
     assert killed.run()['done'] == ['LOOK', 'PICK', 'OPEN', 'PICK', 'PUT']
+
+
+def test_a_branch_that_is_tried_again_has_not_ended_wherever_it_is_killed(tmp_path):
+    """What the oracle decides of it leads to its label, which is no outcome."""
+
+    def build(diary, points):
+        both = smach.Concurrence(['succeeded', 'aborted'], 'succeeded', ['done'], ['done'])
+        with both:
+            smach.Concurrence.add('LEFT', OnceFailing('LEFT', diary, points))
+            smach.Concurrence.add('RIGHT', Noted('RIGHT', diary, points))
+        return around('BOTH', both, ENDS)
+
+    left = Left(build)
+    for point in left.points():
+        killed = left.killed_at(point, tmp_path / 'killed')
+        told = killed.run()
+        assert told.get('outcome') == 'succeeded', (point, told)
+        assert not [text for text in told['log'] if 'is not there any more' in text], point
+        assert killed.diary.count('ends')['LEFT'] >= 2, point

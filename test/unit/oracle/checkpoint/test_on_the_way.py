@@ -3,6 +3,8 @@
 import pytest
 from killed_machines import Noted
 from left_stores import Left
+from test_never_twice import oracle_state
+from test_unanswered import Answers, nobody, questions
 
 import smach
 
@@ -33,9 +35,13 @@ SECONDS = tuple(range(1, 12))
 
 
 @pytest.fixture(scope='module')
-def sent():
+def left():
+    return Left(deep)
+
+
+@pytest.fixture(scope='module')
+def sent(left):
     """Killed in R, then sent to Q, and killed once more."""
-    left = Left(deep)
     in_r = left.folder(left.first_in('R'))
     return Left(deep, begins=in_r, points=SECONDS, on_resume='state:OUTER/INNER/Q')
 
@@ -50,3 +56,11 @@ def test_killed_on_its_way_down_it_begins_no_state_but_the_one_it_was_sent_to(
     begun = killed.diary.count('begins')
     assert begun['P'] == 1
     assert begun['Q'] >= (2 if second > 4 else 1)
+
+
+def test_sent_below_it_asks_before_it_enters_the_container(tmp_path, left):
+    killed = left.killed_at(left.first_in('A'), tmp_path / 'killed')
+    oracle_state(killed, 'goto', 'OUTER/INNER/Q')
+    told = killed.run(on_resume='ask', expert=Answers(tmp_path / 'asked', nobody))
+    assert told['ended_by'] == 'kept'
+    assert [each[1:3] for each in questions(tmp_path / 'asked')] == [['TOP', 'OUTER']]

@@ -1,5 +1,6 @@
 """A machine that was killed goes on where it stood."""
 
+import contextlib
 import os
 import re
 
@@ -9,6 +10,7 @@ from killed_trees import ALL, ENDS, flat, make, tree
 from left_stores import Left
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
 from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
@@ -265,6 +267,21 @@ def test_it_goes_on_from_an_earlier_moment(tmp_path):
     assert min(seq for _, seq, _ in told['events']) > max(each.seq for each in before)
 
 
+def test_from_an_earlier_moment_it_is_sent_to_no_other_state(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=20)
+    first = next(each for each in moments_of(killed) if each.kind == 'STATE_START')
+    told = killed.run(resume_from=first.number, on_resume='state:C')
+    assert told['done'] == ['A', 'B', 'C'] and killed.diary.count('begins')['A'] == 2
+
+
+def test_where_it_goes_on_with_its_last_moment_each_follows_the_one_before_it(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), flat)
+    killed.run(kill_at=12)
+    assert killed.run()['events'][0][0] == 'RESUMED'
+    assert {each.after for each in moments_of(killed)} == {None}
+
+
 def test_killed_once_more_it_goes_on_behind_the_moment_that_it_was_sent_to(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), flat)
     killed.run(kill_at=20)
@@ -298,3 +315,30 @@ def test_what_is_spent_is_stored_where_it_has_changed(tmp_path):
         values = [fact.value.text for fact in facts if fact.name == name]
         assert all(one != other for one, other in zip(values, values[1:])), name
     assert len(facts) < moments  # the time of the budget is in whole seconds
+
+
+def test_a_container_that_comes_under_way_is_stored_once_the_machine_is_wrapped_again(tmp_path):
+    def machine_of(label, state, **ends):
+        machine = smach.StateMachine(['done'])
+        with machine:
+            smach.StateMachine.add(label, state, ends or {'done': 'done'})
+        return machine
+
+    def grow(userdata):
+        with kitchen:
+            smach.StateMachine.add('IN', machine_of('X', nothing), {'done': 'done'})
+        kitchen.set_initial_state(['IN'])
+        OracleContainer.wrap(top)
+        return 'done'
+
+    nothing = smach.CBState(lambda _: 'done', outcomes=['done'])
+    kitchen = machine_of('A', nothing)
+    top = machine_of('GROW', smach.CBState(grow, outcomes=['done']), done='KITCHEN')
+    with top:
+        smach.StateMachine.add('KITCHEN', kitchen, {'done': 'done'})
+    path = str(tmp_path / 'robot.db')
+    OracleContainer.wrap(top, name='TOP', settings={'checkpoint': path})
+    assert top.execute() == 'done'
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        grown = read_tree(store, 1, CODECS).container('TOP/KITCHEN/IN')
+    assert (grown.execution, grown.at) == (1, ['done', 'ended'])

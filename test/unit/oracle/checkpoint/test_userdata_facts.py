@@ -14,6 +14,7 @@ from smach_oracle.store.codecs import CODECS
         # of bytes that nothing else holds, what marshal writes is what it writes of a bytearray
         (lambda: [bytes(2)], lambda: [bytearray(2)]),
         (lambda: [bytes(10000)], lambda: [bytearray(10000)]),
+        (lambda: ['x' * 10000, bytes(2)], lambda: ['x' * 10000, bytearray(2)]),
         (lambda: [1], lambda: [1.0]),
         (lambda: [1], lambda: [True]),
         (lambda: [[1]], lambda: [(1,)]),
