@@ -302,3 +302,27 @@ def test_a_machine_of_which_a_state_was_left_behind_can_be_copied(copied, label,
     other = copied(machine)
     HERE.set()
     assert other.execute() == 'done'
+
+
+class InTurn(smach.Concurrence):
+    """A user's class that goes through its states one after the other, and does not stop."""
+
+    def execute(self, parent_ud=None):
+        self.ended = []
+        for label in ('LEFT', 'RIGHT'):
+            self.ended.append(self._states[label].execute(self.userdata))
+        return 'done'
+
+
+def test_no_branch_begins_in_what_was_abandoned(monkeypatch, log):
+    deaf, right = Deaf(), Scripted()
+    container = InTurn(['done', 'aborted', 'preempted'], 'aborted')
+    with container:
+        smach.Concurrence.add('LEFT', deaf)
+        smach.Concurrence.add('RIGHT', right)
+    machine = abandoned(monkeypatch, deaf, container)
+    assert machine.run() == 'done'
+    let_go(deaf)
+    assert (right.runs, container.ended[1]) == (0, None)
+    said = 'SM_ROOT/X: a branch does not begin, as the state around it was abandoned'
+    assert [text for _, text in log].count(said) == 1

@@ -251,6 +251,74 @@ def test_a_concurrence_that_is_copied_while_it_runs_is_as_at_rest():
     assert type(taken[0]._states['RIGHT']) is Scripted
 
 
+class OwnConcurrence(smach.Concurrence):
+    """A user's class that executes by itself."""
+
+    def execute(self, *args):
+        return smach.Concurrence.execute(self, *args)
+
+
+class OwnIterator(smach.Iterator):
+    """The same."""
+
+    def execute(self, *args):
+        return smach.Iterator.execute(self, *args)
+
+
+def of_class(kind, container):
+    container.__class__ = kind
+    return container
+
+
+OWN = pytest.mark.parametrize(
+    'make',
+    [
+        lambda state: of_class(OwnConcurrence, both(state, Held())),
+        lambda state: of_class(OwnIterator, iterator_over(state, items=[1, 2])),
+    ],
+    ids=['concurrence', 'iterator'],
+)
+
+
+@OWN
+@pytest.mark.parametrize(
+    'copied',
+    [copy.deepcopy, lambda one: pickle.loads(pickle.dumps(one))],
+    ids=['deep copy', 'pickle'],
+)
+def test_a_copy_of_a_class_of_the_users_recovers_inside_its_own_branches(make, copied):
+    if not _can_be_pickled(inside(make(Held()))):
+        pytest.skip('this engine cannot copy a machine')
+    machine = OracleContainer.wrap(inside(make(Held())))
+    other = copied(machine)
+    mine, its = (each.get_children()['ALL'] for each in (machine, other))
+    assert other.execute() == 'done' and mine is not its
+    assert isinstance(its, (OwnConcurrence, OwnIterator))
+    assert all(each.runs > 1 for each in its.get_children().values())
+    assert not any(each.runs for each in mine.get_children().values())
+
+
+@OWN
+def test_a_container_of_a_users_class_shows_its_own_states_while_it_runs(make):
+    def take(state, ud):
+        taken.append(copy.copy(container))
+        seen.update(container.get_children())
+        found.append(container[label])
+        return 'ok'
+
+    taken, seen, found, each = [], {}, [], Scripted(take)
+    container = make(each)
+    label, *_ = before = container.get_children()
+    assert Watched(inside(container)).run() == 'done'
+    assert (seen, found) == (before, [each])
+    (copied,) = taken
+    assert set(map(type, copied.get_children().values())) <= {Scripted, Held}
+    assert vars(copied).get('_items', [1, 2]) == [1, 2]
+    assert type(vars(copied).get('_items', [])) is list
+    if isinstance(container, OwnIterator):
+        assert copied._state is each
+
+
 def test_rates_of_the_branches_of_one_concurrence_are_kept_in_one_file(tmp_path):
     file = str(tmp_path / 'rates.json')
     machine = Watched(

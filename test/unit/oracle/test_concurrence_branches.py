@@ -1,5 +1,6 @@
 """Concurrences of plain states: a branch that fails recovers inside itself, the others go on."""
 
+import os
 import threading
 
 import pytest
@@ -442,3 +443,18 @@ def test_a_machine_beside_a_plain_branch_is_wrapped_and_both_recover():
     )
     assert machine.run() == 'done'
     assert {event.path for event in machine.of(EventKind.FAILURE)} == {'TOP/ALL/LEFT', 'TOP/ALL'}
+
+
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')), reason="upstream's Concurrence wants a mapping"
+)
+@pytest.mark.parametrize('conditions', [(), []])
+def test_an_entry_of_an_outcome_map_that_is_empty_foresees_nothing(conditions):
+    left = Scripted('aborted')
+    outcome_map = {'found': conditions, 'done': {'LEFT': 'ok', 'RIGHT': 'ok'}}
+    concurrence = both(
+        left, Scripted(), outcomes=['done', 'found', 'aborted'], outcome_map=outcome_map
+    )
+    machine = Watched(inside(concurrence, transitions={'done': 'done', 'found': 'done'}))
+    assert machine.run() == 'done' and left.runs == 2
+    assert [event.state for event in machine.of(EventKind.DECISION)] == ['LEFT']

@@ -340,3 +340,41 @@ def test_a_precondition_of_an_item_finds_its_own_keys_alone():
     settings = {'states': {'EACH': {'preconditions': [given]}}}
     assert Watched(machine, settings=settings).run() == 'done'
     assert given.found == [None]
+
+
+def test_an_iterator_that_is_executed_without_the_one_around_it_repeats_none_of_its_items(log):
+    def by_hand(state, ud):
+        assert columns.execute(smach.UserData()) == 'done'
+        return 'ok'
+
+    each = Scripted('ok', 'aborted')
+    columns = each_of(chain(A=each), 'column', (1, 2, 3))
+    machine = chain(ROWS=each_of(columns, 'row'), LAST=Scripted(by_hand))
+    expert = FakeExpert(goto('LAST', container='TOP'))
+    assert Watched(machine, name='TOP', expert=expert, settings=ASKS).run() == 'done'
+    assert each.runs == 5
+    assert not [text for _, text in log if 'repeated' in text]
+
+
+class Numbered(smach.Iterator):
+    """A user's class that returns a number where it has not come to its end."""
+
+    def execute(self, parent_ud=None):
+        outcome = smach.Iterator.execute(self, parent_ud)
+        return outcome if outcome == 'done' else 7
+
+
+def test_items_that_are_repeated_are_told_where_the_end_before_was_no_outcome(log):
+    each = Scripted('ok', 'found', outcomes=('ok', 'found'))
+    items = Numbered(
+        ['done', 'preempted'], [], [], it=[1, 2], it_label='item', exhausted_outcome='done'
+    )
+    with items:
+        smach.Iterator.set_contained_state(
+            'EACH', each, loop_outcomes=['ok'], final_outcome_map={'found': 'preempted'}
+        )
+    expert = FakeExpert(goto('FIRST'))
+    machine = Watched(chain(FIRST=Scripted(), ALL=items), name='TOP', expert=expert, settings=ASKS)
+    assert machine.run() == 'done'
+    told = 'TOP/ALL: begins with its first item again: item 1 that had ended is repeated'
+    assert [text for level, text in log if 'that had ended' in text] == [told]

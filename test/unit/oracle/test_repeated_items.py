@@ -267,3 +267,16 @@ def test_an_iterator_whose_state_was_exchanged_as_it_began_goes_on_too():
     iterator.register_start_cb(exchange)
     watched, left = total_of(machine_of(iterator))
     assert left[1] == [1, 2, 2, 3] and told(watched) == WITH_2
+
+
+def test_an_iterator_whose_userdata_is_thrown_away_takes_what_is_given_from_above():
+    def throw_away(question, cancelled, progress):
+        iterator.userdata = smach.UserData()
+        return goto('ALL', container='TOP')
+
+    iterator = over(Scripted('ok', 'stuck', outcomes=('ok', 'stuck')))
+    watched, left = total_of(
+        machine_of(iterator), throw_away, policy='always_ask', userdata='keep'
+    )
+    assert left == (0, []) and iterator.userdata.total == 0
+    assert told(watched) == WITH_2

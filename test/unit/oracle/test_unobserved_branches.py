@@ -7,6 +7,7 @@ import threading
 import pytest
 from branch_machines import Item, both, inside, iterator_over
 from guarded_machines import chain
+from held_machines import Held, eventually
 from machines import FakeExpert, Scripted, chain_of, give_up, goto, supersede
 from test_pinned_branches import rows_of
 from waiting import wait_for
@@ -330,3 +331,42 @@ def test_a_container_that_ends_well_though_it_was_left_is_left(behind):
     )
     assert [machine.execute() for _ in range(3)] == ['done'] * 3
     assert (first.runs, left.runs) == (4, 4)
+
+
+def test_a_preempt_that_comes_as_a_branch_begins_reaches_its_state():
+    class Asked(Hears):
+        def preempt_requested(self):
+            if at_last and not asked:
+                asked.append(self.heard)
+                machine.request_preempt()
+            return Hears.preempt_requested(self)
+
+    def is_reached(state, ud):
+        reached.append(state.preempt_requested())
+        state.service_preempt()
+        return 'preempted'
+
+    asked, at_last, reached = [], [], []
+    each = Asked('ok', 'ok', is_reached)
+    machine = OracleContainer.wrap(inside(iterator_over(each, (1, 2))))
+    assert machine.execute() == 'done'
+    at_last.append(True)
+    assert machine.execute() == 'preempted'
+    assert asked and all(reached)
+
+
+def test_each_item_is_confirmed_though_nobody_observes():
+    each = Scripted()
+    held = Held(
+        inside(iterator_over(each, (1, 2, 3))),
+        name='TOP',
+        settings={'states': {'ALL/EACH': {'autonomy': 'confirm'}}},
+    )
+    held.machine.events.observers.remove(held.events.append)
+    with held.begin():
+        for done in range(3):
+            held.waits_before('TOP/ALL/EACH')
+            assert each.runs == done
+            held.hand.confirm()
+            eventually(lambda number=done + 1: each.runs == number)
+        assert held.end() == 'done'

@@ -5,7 +5,7 @@ import threading
 import pytest
 from branch_machines import Item, both, inside, iterator_over
 from guarded_machines import OUTCOMES, chain
-from machines import FakeExpert, Scripted, Watched, goto, in_thread, supersede
+from machines import FakeExpert, Scripted, Watched, give_up, goto, in_thread, supersede
 from test_time_limits import ABANDONING, LimitClock
 
 import smach
@@ -50,6 +50,19 @@ def test_a_state_is_preempted_for_its_container_while_its_failure_is_asked_about
     machine = inside(container, transitions={'ok': 'done'})
     OracleContainer.wrap(machine, expert=expert, settings=settings).execute()
     assert seen == [True]
+
+
+def test_a_container_sees_the_request_that_its_state_has_by_itself():
+    def look(a, ud):
+        state.request_preempt()
+        seen.append(a.preempt_requested())
+        state.recall_preempt()
+        seen.append(a.preempt_requested())
+        return a.execute(ud)
+
+    seen, state = [], Scripted()
+    machine = inside(Own(look, state), transitions={'ok': 'done'})
+    assert OracleContainer.wrap(machine).execute() == 'done' and seen == [True, False]
 
 
 def test_two_executions_of_one_container_leave_it_with_its_own_states():
@@ -204,3 +217,32 @@ def test_an_iterator_that_is_executed_by_hand_is_no_execution_in_its_tree(log):
     userdata.done = []
     assert iterator.execute(userdata) == 'done'
     assert not [text for level, text in log if level == 'warn']
+
+
+class TriesFirst(smach.Iterator):
+    """Executes its state once before the first item."""
+
+    def execute(self, parent_ud=None):
+        self._state.execute(self.userdata)
+        return smach.Iterator.execute(self, parent_ud)
+
+
+def test_a_state_that_fails_before_the_first_item_passes_over_none():
+    iterator = TriesFirst(
+        OUTCOMES, [], [], it=(1, 2), it_label='item', exhausted_outcome='done'
+    )
+    with iterator:
+        each = Scripted('aborted', 'ok', 'aborted')
+        smach.Iterator.set_contained_state('EACH', each, break_outcomes=['preempted'])
+    machine = Watched(inside(iterator))
+    assert machine.run() == 'done' and each.runs == 3
+    texts = [event.text for event in machine.of(EventKind.WARNING)]
+    assert texts == ['item 2 of 2 is passed over with aborted, as its author has drawn it']
+
+
+def test_a_failure_that_was_given_up_in_a_branch_settles_none_after_it_has_ended_well():
+    expert = FakeExpert(give_up('ok'), supersede('ok'))
+    machine = own(lambda a, ud: [a.execute(ud) for _ in range(3)] and 'aborted', 'ok', 'aborted')
+    settings = {'policy': 'always_ask'}
+    assert OracleContainer.wrap(machine, expert=expert, settings=settings).execute() == 'done'
+    assert [each.failed_state for each in expert.questions] == ['A', 'ALL']
