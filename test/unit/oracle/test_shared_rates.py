@@ -372,6 +372,18 @@ def test_a_failure_that_is_taken_back_is_taken_out(kind):
     assert found.get('window', [0, 0, 0]) == [0, 0, 0]
 
 
+def test_a_failure_that_comes_in_place_of_one_that_is_taken_back_counts_once():
+    mine = estimator('window', [False, True])
+    base = base_of(mine.snapshot())
+    others = estimator('window', [False, True, False]).snapshot()
+    mine.take_back_failure()
+    for failed in (False, True):
+        mine.add(failed)
+    found = merged(mine.snapshot(), base, others, 5)
+    assert (found['successes'], found['failures']) == (3, 1)
+    assert sorted(found['window']) == [0, 0, 0, 1]
+
+
 @pytest.fixture
 def meanwhile(monkeypatch):
     """A list of what happens, once, while the record of a state with learned rates is made."""

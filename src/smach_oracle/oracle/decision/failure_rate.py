@@ -317,7 +317,7 @@ def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapsh
 
 
 def _latest(window: List[int], count: int, failures: int) -> List[int]:
-    if failures < 0:
+    if failures <= 0:  # one that was taken back may stand for one that came since
         return [0] * count
     return window[-count:] if count else []
 
