@@ -251,6 +251,17 @@ def test_what_a_precondition_that_was_met_wrote_stays_where_the_next_one_is_not_
     assert concurrence.userdata.mine == 'met'
 
 
+def test_a_jump_misses_what_a_precondition_that_is_not_met_has_written():
+    def fails(ud):
+        ud.mine = 'half'
+        return False
+
+    concurrence = both(Scripted('aborted', input_keys=['mine']), Scripted())
+    machine = watched(concurrence, preconditions={'ALL/LEFT': [fails]})
+    machine.run()
+    assert machine.of(EventKind.JUMP)[0].data['missing_keys'] == ['mine']
+
+
 def test_an_expert_names_the_branch_beside_by_its_path():
     expert = FakeExpert(goto('RIGHT', container='TOP/ALL'))
     left, right = Scripted('aborted'), Scripted()
