@@ -219,3 +219,52 @@ def test_the_next_run_after_a_preempted_one_is_as_any_other():
     assert run.result() == 'preempted'
     machine.machine['A'].script.append('aborted')
     assert machine.run() == 'done'
+
+
+class NotesOnly(smach.StateMachine):
+    """Only notes a request. Its states hear of it at their boundaries."""
+
+    def request_preempt(self):
+        smach.State.request_preempt(self)
+
+
+def test_each_request_that_a_machine_only_notes_reaches_the_next_state_once():
+    def asks(state, ud):
+        machine.machine.request_preempt()
+        return 'ok'
+
+    def serviced(state, ud):
+        heard.append(state.preempt_requested())
+        state.service_preempt()
+        return 'ok'
+
+    heard = []
+    steps = [asks, serviced, serviced] * 2
+    machine = Watched(chain_of(*map(Scripted, steps), machine_class=NotesOnly))
+    assert machine.run() == 'done'
+    assert heard == [True, False] * 2
+    assert [event.state for event in machine.of(EventKind.PREEMPT)] == ['A', 'D']
+
+
+def test_a_request_between_two_states_is_told_before_the_next_one_begins():
+    bare = chain_of(Scripted(), Scripted('preempted'), machine_class=NotesOnly)
+    machine = Watched(bare)
+    machine.machine.register_transition_cb(lambda *_: machine.machine.request_preempt())
+    machine.run()
+    told = machine.of(EventKind.PREEMPT, EventKind.STATE_START)
+    assert [(event.kind.name, event.state) for event in told[1:]] == [
+        ('PREEMPT', 'B'),
+        ('STATE_START', 'B'),
+    ]
+
+
+def test_a_machine_that_only_notes_a_request_has_serviced_it_where_it_ends_preempted():
+    machine = Watched(
+        chain_of(
+            Scripted(lambda state, ud: machine.machine.request_preempt() or 'preempted'),
+            machine_class=NotesOnly,
+        )
+    )
+    assert machine.run() == 'preempted'
+    assert machine.machine.preempt_requested() is False
+    assert machine.run() == 'done'
