@@ -224,3 +224,18 @@ def test_a_trial_that_a_shutdown_has_ended_says_so_though_that_is_over(monkeypat
     first.script = [lambda state, ud: set_shutdown(True) or 'ok']
     assert machine.run() is None
     assert machine.events[-1].data == {ENDED_BY: TrialEnd.SHUTDOWN.value}
+
+
+def test_each_state_goes_by_its_own_transitions_while_they_change():
+    """Those of the first state had led to the same place as those of the second one."""
+    first, second = Scripted(), Scripted(*['next'] * 3, outcomes=('ok', 'next'))
+    first.register_outcomes(['next'])
+    bare = chain_of(first, second, Scripted(), Scripted())
+    bare._transitions['A']['next'] = bare._transitions['B']['next'] = target = 'C'
+    machine = Watched(bare)
+    run_before(machine.machine)
+    assert target in machine.visits()
+    machine.events.clear()
+    bare._transitions['B']['next'] = 'D'
+    assert machine.run() == 'done'
+    assert machine.visits() == ['A', 'B', 'D']
