@@ -167,3 +167,24 @@ def test_what_has_failed_as_a_preempt_comes_is_no_failure_though_the_robot_is_no
     assert not machine.of(EventKind.FAILURE) and first.runs == fails
     ends = [event.data for event in machine.of(EventKind.TRANSITION) if event.state == 'A']
     assert ends == ([None] if target == 'B' else [])
+
+
+def test_a_visit_that_fails_as_a_preempt_comes_is_a_preempted_one():
+    """Its author recovers from it, and what serviced the preempt lets the machine go on."""
+
+    def look():
+        if first.runs and not second.runs:
+            machine.machine.request_preempt()
+        return ''
+
+    first = Scripted('aborted', ValueError())
+    second = Scripted(lambda state, ud: state.service_preempt() or 'ok')
+    bare = chain_of(first, second)
+    bare._transitions['A'].update(ok='done', aborted='B')
+    bare._transitions['B'].update(ok='A')
+    expert = FakeExpert(supersede('ok'))
+    settings = dict(SETTINGS, policy='always_ask')
+    machine = Watched(bare, health=look, expert=expert, settings=settings)
+    assert machine.run() == 'done'
+    history = [(visit.state, visit.result.name) for visit in expert.questions[0].history]
+    assert history == [('A', 'PREEMPTED'), ('B', 'PREEMPTED'), ('A', 'FAILURE')]
