@@ -446,3 +446,16 @@ def test_nobody_is_asked_about_what_fails_anywhere_in_a_precondition():
     assert watched.run() == 'done'
     assert not expert.questions
     assert [event.outcome for event in watched.of(EventKind.PRECONDITION_END)] == ['not met']
+
+
+def test_a_machine_that_is_run_as_a_precondition_steps_back_within_itself_alone():
+    see = chain(FIRST=Scripted('ok', 'aborted'), LAST=Scripted())
+    machine = chain(SEE=see, MOVE=Scripted(), PICK=Scripted('aborted'))
+    settings = {
+        'policy': 'algorithm1',
+        'step_back_across': True,
+        'states': {'PICK': {'preconditions': ['SEE']}},
+    }
+    watched = Watched(machine, settings=settings)
+    assert watched.run() == 'done'
+    assert watched.decisions() == [('revisit', 'FIRST'), ('step_back', 'MOVE')]
