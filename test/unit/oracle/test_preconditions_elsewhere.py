@@ -458,4 +458,4 @@ def test_a_machine_that_is_run_as_a_precondition_steps_back_within_itself_alone(
     }
     watched = Watched(machine, settings=settings)
     assert watched.run() == 'done'
-    assert watched.decisions() == [('revisit', 'FIRST'), ('step_back', 'MOVE')]
+    assert watched.decisions() == [('step_back', 'FIRST'), ('step_back', 'MOVE')]
