@@ -5,7 +5,7 @@ import threading
 import pytest
 from guarded_machines import chain, guarded
 from machines import FakeExpert, FakeHealth, Gate, Scripted, Watched, goto, in_thread, supersede
-from test_still_running import SOON, asked, told
+from test_still_running import SOON, asked, letting_go, told
 from waiting import wait_for
 
 import smach
@@ -304,3 +304,23 @@ def test_the_time_of_a_question_inside_is_no_time_of_the_state(clock):
     )
     assert machine.run() == 'done'
     assert [question.failed_state for question in expert.questions] == ['A', 'A']
+
+
+def test_the_longest_visit_of_a_state_is_told_though_the_later_ones_were_short():
+    """Shorter ones came by its author's transitions, and by the oracle."""
+    gate = Gate()
+    long = Scripted(
+        lambda state, ud: threading.Event().wait(0.2) or 'again',
+        'again',
+        'aborted',
+        'aborted',
+        gate,
+        outcomes=('ok', 'again', 'aborted', 'preempted'),
+    )
+    bare = chain(A=long)
+    bare._transitions['A']['again'] = 'A'
+    expert = FakeExpert(goto('A'), goto('A'), letting_go(gate, None))
+    machine = Watched(bare, expert=expert, settings=dict(SOON, policy='always_ask'))
+    assert machine.run() == 'done'
+    told_s = expert.questions[2].text.split('its longest so far was ')[1].split(' s')[0]
+    assert float(told_s) >= 0.2

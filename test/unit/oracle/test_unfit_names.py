@@ -9,6 +9,7 @@ from guarded_machines import both, chain
 from machines import Scripted
 from pinned import held
 
+import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.errors import SettingsError
 
@@ -89,3 +90,20 @@ def test_what_is_no_state_has_no_oracle_that_could_be_named():
     tree = chain(BOTH=both(DUCK=Duck(), BIRD=Scripted()))
     found = unfit_in(tree, {'nested': ['BOTH/DUCK', 'BOTH/BIRD']})
     assert len(found) == 1 and 'BOTH/DUCK' in found[0]
+
+
+def test_names_are_looked_at_again_once_a_state_has_come_and_not_before(log):
+    def warned():
+        return sum(level == 'warn' and 'is no state' in text for level, text in log)
+
+    settings = {'states': {'NOWHERE': {'memory': 5}}}
+    machine = OracleContainer.wrap(chain(A=Scripted()), settings=settings, strict=False)
+    counts = [warned()]
+    for label in ('', 'LATER'):
+        if label:
+            with machine:
+                smach.StateMachine.add(label, Scripted(), {'ok': 'done'})
+        machine.execute()
+        machine.execute()
+        counts.append(warned())
+    assert counts == [1, 1, 2]
