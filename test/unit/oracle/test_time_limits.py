@@ -18,6 +18,7 @@ from machines import (
     supersede,
     watched,
 )
+from test_preempt_and_shutdown import NotesOnly
 from waiting import wait_for
 
 import smach
@@ -334,6 +335,25 @@ def test_an_overrun_under_a_preempt_ends_the_machine_as_preempted(clock):
     preempted.set()
     assert run.result() == 'preempted'
     state.leave()
+
+
+def test_an_overrun_under_a_preempt_has_obeyed_it_where_its_author_cleans_up(clock):
+    preempted, seen = threading.Event(), []
+
+    def slow(state, ud):
+        machine.machine.request_preempt()
+        preempted.set()
+        assert wait_for(state.preempt_requested, 20), 'at its limit'
+        return 'ok'
+
+    cleans = Scripted(lambda state, ud: seen.append(state.preempt_requested()) or 'aborted')
+    bare = chain_of(Scripted(slow), cleans, machine_class=NotesOnly)
+    bare._transitions['A']['preempted'] = 'B'
+    machine = Watched(bare, settings={'states': {'A': LIMITED}})
+    clock.end(1, preempted)
+    assert machine.run() == 'aborted'
+    assert seen == [False] and not machine.of(EventKind.DECISION)
+    assert machine.machine.preempt_requested() is False
 
 
 def test_an_overrun_that_nobody_resolves_stops_with_the_machines_failing_outcome():
