@@ -154,6 +154,8 @@ def cleaned_and_all(diary, points):
     """ALL, which leads to CLEAN at a preempt, and that back to ALL."""
     inner = nested(diary, points)
     inner.register_outcomes(['preempted'])
+    inner['I0'].register_outcomes(['preempted'])
+    inner._transitions['I0']['preempted'] = 'I1'
     clean = Scripted(lambda state, userdata: state.service_preempt() or 'ok')
     top = smach.StateMachine(['succeeded', 'aborted'])
     top.userdata.done = []
