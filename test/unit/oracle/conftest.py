@@ -15,7 +15,6 @@ from fake_clock import FakeClock
 import smach
 from smach_oracle.oracle.machine import tree
 
-
 FAILS = 'error::pytest.PytestUnhandledThreadExceptionWarning'
 
 
