@@ -135,7 +135,6 @@ class IteratorWrapper(ContainerWrapper):
             tracked=None,
             goes_on=False,
             _ended_with=None,
-            _is_asked_to_go_on=False,
             _given={},
             at_item=None,
         )

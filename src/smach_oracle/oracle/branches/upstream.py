@@ -156,9 +156,7 @@ def _stand_in(container: Any, hook: Any) -> Tables:
 
     if isinstance(container, smach.Iterator):
         own = items_of(container), iterated_state_of(container)
-        set_items(
-            container, hook.items(container, own[0]), of(iterated_label_of(container), own[1])
-        )
+        set_items(container, hook.tracked, of(iterated_label_of(container), own[1]))
         return (*own, {})
     states = states_of(container)
     set_states(container, {label: of(label, state) for label, state in states.items()})
