@@ -242,7 +242,6 @@ class Checkpointer:
         pending = self._pending_of(self._top)
         for node in self._nodes.values():
             pending += self._facts_of(node).all_states()
-        pending += self._collected(self._top)
         for goal_id, server in GOALS.running().items():
             self._goals.add(goal_id)
             pending.append(fact_of('', GOAL + goal_id, server))
