@@ -123,7 +123,7 @@ def test_a_goal_is_stored_as_it_is_sent_and_once_it_has_ended(tmp_path):
             ]
 
 
-def test_a_goal_that_runs_as_a_trial_begins_is_stored_until_it_has_ended(tmp_path):
+def test_a_goal_that_runs_as_a_trial_begins_is_stored_until_it_has_ended(tmp_path, log):
     def ends(userdata):
         GOALS.end('lift')
         return 'succeeded'
@@ -136,6 +136,9 @@ def test_a_goal_that_runs_as_a_trial_begins_is_stored_until_it_has_ended(tmp_pat
     path = str(tmp_path / 'robot.db')
     GOALS.keep('lift', '/torso')
     OracleContainer.wrap(machine, settings={'checkpoint': path}).execute()
+    GOALS.begin('after', '/torso')
+    GOALS.end('after')
+    assert not [text for level, text in log if level in ('warn', 'err')], 'nobody stores it'
     with contextlib.closing(StoreFile(path, read_only=True)) as store:
         facts = [each for each in store.facts(1) if each.name == 'goal:lift']
     assert [(each.kind, each.label, each.value.text) for each in facts] == [

@@ -342,3 +342,21 @@ def test_a_container_that_comes_under_way_is_stored_once_the_machine_is_wrapped_
     with contextlib.closing(StoreFile(path, read_only=True)) as store:
         grown = read_tree(store, 1, CODECS).container('TOP/KITCHEN/IN')
     assert (grown.execution, grown.at) == (1, ['done', 'ended'])
+
+
+def test_of_a_machine_that_has_ended_all_userdata_are_stored_as_they_were_then(tmp_path):
+    """Also a value that was changed inside, by a function that has told nobody of it."""
+
+    def changes(userdata):
+        machine.userdata.notes.append('changed')
+        return 'done'
+
+    machine = smach.StateMachine(['done'])
+    machine.userdata.notes = ['before']
+    with machine:
+        smach.StateMachine.add('A', smach.CBState(changes, outcomes=['done']))
+    path = str(tmp_path / 'robot.db')
+    OracleContainer.wrap(machine, name='TOP', settings={'checkpoint': path})
+    assert machine.execute() == 'done'
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        assert read_tree(store, 1, CODECS).container('TOP').keys['notes'] == ['before', 'changed']
