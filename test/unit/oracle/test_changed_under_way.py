@@ -6,11 +6,14 @@ import signal
 from typing import Any, List
 
 import pytest
+from branch_machines import both
+from guarded_machines import chain
 from machines import Scripted, Watched, chain_of
 from waiting import wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.smach_private import iterated_state_of, set_items
 
 
@@ -140,3 +143,15 @@ def test_ways_of_others_in_place_of_those_of_the_oracle_are_replaced() -> None:
     ways['ORACLE'] = dict.fromkeys(map(str, range(len(ways['ORACLE']))))
     assert machine.run() == 'done'
     assert ways['ORACLE']['A'] == 'A'
+
+
+def test_an_outcome_that_a_branch_gets_under_way_is_one_of_its_own() -> None:
+    def register(state: smach.State, ud: Any) -> str:
+        left.register_outcomes(['more'])
+        return 'ok'
+
+    left, right = Scripted('more'), Scripted()
+    concurrence = both(left, right, outcome_map={'done': {'RIGHT': 'ok'}})
+    watched = Watched(chain(FIRST=Scripted(register), BOTH=concurrence))
+    assert watched.run() == 'done' and left.runs == 1
+    assert not watched.of(EventKind.FAILURE)

@@ -370,3 +370,16 @@ def test_each_item_is_confirmed_though_nobody_observes():
             held.hand.confirm()
             eventually(lambda number=done + 1: each.runs == number)
         assert held.end() == 'done'
+
+
+@pytest.mark.parametrize('is_observed', [False, True])
+def test_an_item_that_begins_with_a_request_of_its_state_teaches_nothing(is_observed):
+    each = Scripted()
+    machine = OracleContainer.wrap(inside(iterator_over(each, (1, 2))))
+    if is_observed:
+        machine.events.observers.append(lambda event: None)
+    assert machine.execute() == 'done'
+    each.request_preempt()
+    assert machine.execute() == 'done'
+    successes = {row.state: row.successes for row in machine.rates()}['EACH']
+    assert (each.runs, successes) == (4, 2)

@@ -1,5 +1,7 @@
 """Concurrences and Iterators that execute in a way of their own, or at a time of their own."""
 
+import copy
+import os
 import threading
 
 import pytest
@@ -246,3 +248,30 @@ def test_a_failure_that_was_given_up_in_a_branch_settles_none_after_it_has_ended
     settings = {'policy': 'always_ask'}
     assert OracleContainer.wrap(machine, expert=expert, settings=settings).execute() == 'done'
     assert [each.failed_state for each in expert.questions] == ['A', 'ALL']
+
+
+class LooksFirst(smach.Concurrence):
+    """A user's class that looks for a request before it executes its state, and makes one then."""
+
+    def execute(self, parent_ud=None):
+        self.seen = self._states['A'].preempt_requested()
+        return self._states['A'].execute(self.userdata)
+
+
+def test_a_copy_of_a_branch_that_is_preempted_has_no_request():
+    def take(state, ud):
+        if not taken:
+            container._states['A'].request_preempt()
+            state.service_preempt()
+            taken.append(copy.deepcopy(machine))
+        return 'ok'
+
+    taken, container = [], LooksFirst(['ok', 'preempted', 'aborted'], 'aborted')
+    with container:
+        smach.Concurrence.add('A', Scripted(take))
+    machine = inside(container, transitions={'ok': 'done'})
+    if os.environ.get('SMACH_UPSTREAM'):
+        pytest.skip('this engine cannot copy a machine')
+    OracleContainer.wrap(machine).execute()
+    (other,) = taken
+    assert other.execute() == 'done' and not other.get_children()['ALL'].seen
