@@ -37,7 +37,7 @@ class WrappedExecution:
     """
 
     outcome: Optional[str] = None
-    is_entered = False
+    is_entered: bool
 
 
 class ContainerWrapper:
