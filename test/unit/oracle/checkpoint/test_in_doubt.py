@@ -135,3 +135,10 @@ def test_a_state_that_is_held_back_ends_no_resumed_trial(tmp_path, first, on_no_
         told = killed.run(on_no_answer=on_no_answer, **settings)
         assert (told['outcome'], told['ended_by']) == (None, 'kept'), told['log']
     assert killed.diary.count('begins') == {'LOOK': 2, 'POUR': 1, 'CARRY': 1}
+
+
+def test_it_is_said_that_states_may_have_run_since_the_fault_of_the_store(tmp_path):
+    said = 'TOP: {} was not written any more after a fault of the store'
+    killed = broken(tmp_path / 'killed')
+    told = killed.run()
+    assert [text for text in told['log'] if text.startswith(said.format(killed.store))]

@@ -346,3 +346,15 @@ def test_of_a_tree_nothing_is_done_twice_whatever_kills_it_and_wherever_it_is_se
     assert told is None or told.get('ended_by') in ('outcome', 'kept'), told
     begun = killed.diary.count('begins')
     assert {name: count for name, count in begun.items() if count > 1} == {}
+
+
+def test_a_script_that_has_changed_twice_goes_on_by_the_names_of_each(tmp_path):
+    folder = tmp_path / 'killed'
+    killed_in(folder, FLAT, 'CARRY')
+    second = KilledMachine(folder, chain('LOOK', 'TEA', 'CARRY'), resume_map={'POUR': 'TEA'})
+    assert second.run(kill_at=3) is None
+    third = KilledMachine(folder, chain('SEE', 'TEA', 'CARRY'), resume_map={'LOOK': 'SEE'})
+    told = third.run()
+    assert told.get('outcome') == 'succeeded', told
+    assert 'TOP: goes on with LOOK as SEE' in told['log']
+    assert third.diary.count('begins')['POUR'] == 1
