@@ -314,15 +314,31 @@ class InTurn(smach.Concurrence):
         return 'done'
 
 
-def test_no_branch_begins_in_what_was_abandoned(monkeypatch, log):
-    deaf, right = Deaf(), Scripted()
+def in_turn(left, right):
     container = InTurn(['done', 'aborted', 'preempted'], 'aborted')
     with container:
-        smach.Concurrence.add('LEFT', deaf)
+        smach.Concurrence.add('LEFT', left)
         smach.Concurrence.add('RIGHT', right)
+    return container
+
+
+def test_no_branch_begins_in_what_was_abandoned(monkeypatch, log):
+    deaf, right = Deaf(), Scripted()
+    container = in_turn(deaf, right)
     machine = abandoned(monkeypatch, deaf, container)
     assert machine.run() == 'done'
     let_go(deaf)
     assert (right.runs, container.ended[1]) == (0, None)
     said = 'SM_ROOT/X: a branch does not begin, as the state around it was abandoned'
     assert [text for _, text in log].count(said) == 1
+
+
+def test_a_branch_that_ends_after_it_was_abandoned_teaches_nothing(monkeypatch):
+    deaf = Deaf()
+    machine = abandoned(monkeypatch, deaf, in_turn(deaf, Scripted()), observed=False)
+    deaf.let_go.set()
+    assert machine.run() == 'done'
+    deaf.let_go.clear()
+    assert machine.run() == 'done'
+    let_go(deaf)
+    assert (deaf.runs, machine.rate('LEFT').successes) == (2, 1)

@@ -3,6 +3,7 @@
 import copy
 import os
 import signal
+import threading
 from typing import Any, List
 
 import pytest
@@ -155,3 +156,18 @@ def test_an_outcome_that_a_branch_gets_under_way_is_one_of_its_own() -> None:
     watched = Watched(chain(FIRST=Scripted(register), BOTH=concurrence))
     assert watched.run() == 'done' and left.runs == 1
     assert not watched.of(EventKind.FAILURE)
+
+
+def test_a_copy_of_a_concurrence_that_a_state_executes_runs_bare() -> None:
+    def run_the_copy(state: smach.State, ud: Any) -> str:
+        assert ended.wait(20)
+        outcomes.append(copy.copy(concurrence).execute())
+        return 'ok'
+
+    outcomes: List[str] = []
+    ended = threading.Event()
+    left, right = Scripted(run_the_copy), Scripted('ok', 'aborted')
+    concurrence = both(left, right, child_termination_cb=lambda _: ended.set())
+    machine = OracleContainer.wrap(chain(BOTH=concurrence), settings={'policy': 'retry'})
+    assert machine.execute() == 'done'
+    assert (outcomes, right.runs) == (['aborted'], 2)
