@@ -5,6 +5,7 @@ import threading
 import pytest
 from guarded_machines import OUTCOMES, both, chain
 from machines import FakeExpert, Scripted, Watched, contents, give_up, in_thread, supersede
+from test_wrapped_changes import needs_constants
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
@@ -459,3 +460,21 @@ def test_a_machine_that_is_run_as_a_precondition_steps_back_within_itself_alone(
     watched = Watched(machine, settings=settings)
     assert watched.run() == 'done'
     assert watched.decisions() == [('step_back', 'FIRST'), ('step_back', 'MOVE')]
+
+
+@needs_constants
+def test_a_precondition_in_a_machine_finds_its_constants_there_as_when_the_machine_begins():
+    seen = []
+
+    def look(state, ud):
+        seen.append(ud.side)
+        return 'ok'
+
+    see = smach.StateMachine(OUTCOMES, input_keys=['side'])
+    with see:
+        smach.StateMachine.add('LOOK', Scripted(look, look, input_keys=['side']), {'ok': 'done'})
+    turn = Scripted(lambda state, ud: setattr(ud, 'side', 'right') or 'ok', output_keys=['side'])
+    top = chain(SEE=see, TURN=turn, PICK=Scripted('aborted'))
+    top._constants['SEE'] = {'side': 'left'}
+    assert wrapped(top, 'PICK', 'SEE/LOOK').run() == 'done'
+    assert seen == ['left', 'left']
