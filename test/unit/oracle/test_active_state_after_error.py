@@ -1,7 +1,7 @@
 """After an error `get_active_states` names the state that failed, as it does without an oracle."""
 
 import pytest
-from machines import FakeExpert, Scripted, chain_of, give_up
+from machines import FakeExpert, Scripted, chain_of, give_up, supersede
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -89,3 +89,15 @@ def test_where_the_oracle_only_observes_the_log_names_a_state_that_has_raised(
     with pytest.raises(kind):
         machine.execute()
     assert [text for text in logged if 'ended in an error' in text] == said
+
+
+def test_a_nested_machine_that_runs_alone_after_the_error_has_nothing_above_it():
+    inner = chain_of(Scripted(ValueError('broken'), 'aborted'))
+    top = chain_of(Scripted(), inner)
+    expert = FakeExpert(give_up(), supersede('ok'))
+    OracleContainer.wrap(top, settings={'policy': 'always_ask'}, expert=expert)
+    with pytest.raises(smach.InvalidUserCodeError):
+        top.execute()
+    assert inner.execute() == 'done'
+    choices = expert.questions[1].choices
+    assert [(choice.container, choice.state) for choice in choices] == [('', 'A')]

@@ -111,6 +111,19 @@ def test_a_machine_under_another_name_goes_on_with_what_was_learned(tmp_path):
     assert learned(path, 'OLD') == (1, 2)
 
 
+def test_a_machine_that_lies_in_another_one_by_now_reads_its_own_file_no_more(tmp_path):
+    path = tmp_path / 'inner.json'
+    machine(path, 'TASK', []).run()
+    inner = machine(path, 'TASK', [])
+    outer = Watched(
+        chain_of(inner.machine), name='OUTER', settings={'rates_file': str(tmp_path / 'outer.json')}
+    )
+    outer.run()
+    inner.run()
+    assert inner.rate('A').successes == 3
+    assert learned(path, 'TASK') == (1, 0)
+
+
 def test_a_file_of_before_is_read_and_keeps_its_states(tmp_path):
     path = tmp_path / 'rates.json'
     good = {'estimator': 'window', 'successes': 3, 'failures': 1, 'window': [0, 1, 0, 0]}
