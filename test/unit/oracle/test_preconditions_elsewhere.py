@@ -478,3 +478,18 @@ def test_a_precondition_in_a_machine_finds_its_constants_there_as_when_the_machi
     top._constants['SEE'] = {'side': 'left'}
     assert wrapped(top, 'PICK', 'SEE/LOOK').run() == 'done'
     assert seen == ['left', 'left']
+
+
+def test_what_a_precondition_in_a_machine_takes_away_there_is_not_handed_up():
+    def look(state, ud):
+        ud.pose = 'half'
+        see.userdata = smach.UserData()
+        return 'ok'
+
+    see = smach.StateMachine(OUTCOMES, output_keys=['pose'])
+    with see:
+        smach.StateMachine.add('LOOK', Scripted('ok', look, output_keys=['pose']), {'ok': 'done'})
+    see.userdata.pose = 'seen'
+    machine = wrapped(chain(SEE=see, PICK=Scripted('aborted')), 'PICK', 'SEE/LOOK')
+    assert machine.run() == 'done' and [end[3] for end in ends(machine)] == ['met']
+    assert contents(machine.machine.userdata) == {'pose': 'seen'}
