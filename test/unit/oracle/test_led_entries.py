@@ -200,3 +200,12 @@ def test_a_state_to_which_the_oracle_led_before_is_come_to_by_itself_later():
     )
     assert machine.run() == 'done'
     assert [question.failed_state for question in expert.questions] == ['A', 'B']
+
+
+def test_a_container_says_in_which_state_it_begins_where_it_was_led_to_one():
+    inner = chain(X=Scripted('ok', 'ok'), Y=Scripted())
+    expert = FakeExpert(goto('Y', container='SM_ROOT/IN'))
+    machine = Watched(chain(IN=inner, END=Scripted('aborted')), expert=expert, settings=ASKS)
+    assert machine.run() == 'done'
+    begins = [event.state for event in machine.of(EventKind.CONTAINER_START)]
+    assert begins == ['IN', 'X', 'Y']

@@ -1,6 +1,5 @@
 """What bounds the question about a state that still runs: the trial's budget, the state's end."""
 
-import copy
 import threading
 
 import pytest
@@ -325,14 +324,3 @@ def test_the_longest_visit_of_a_state_is_told_though_the_later_ones_were_short()
     assert machine.run() == 'done'
     told_s = expert.questions[2].text.split('its longest so far was ')[1].split(' s')[0]
     assert float(told_s) >= 0.2
-
-
-def test_a_copy_of_a_machine_on_the_oracles_way_was_led_nowhere():
-    gate, copies, expert = Gate(), [], FakeExpert(goto('A'))
-    machine = asked(Scripted('aborted'), expert=expert)
-    machine.machine.register_transition_cb(lambda *_: copies.append(copy.copy(machine.machine)))
-    assert machine.run() == 'done' and len(copies) == 2
-    twin = copies[1]
-    twin['A'].script = [lambda state, ud: gate.go.wait(0.3) or 'ok']  # six times what it takes
-    assert twin.execute() == 'done'
-    assert not expert.questions
