@@ -177,6 +177,26 @@ def test_a_container_that_raises_as_it_is_left_counts_as_left():
     assert counted['ARM', 'left', 'ORACLE'] == 1
 
 
+class Keeps(Clears):
+    """Leaves its preempt to whoever has asked for it."""
+
+    def service_preempt(self):
+        pass
+
+
+def test_what_a_container_raises_as_it_is_left_is_told_and_its_preempt_taken_back(log):
+    arm = Keeps(outcomes=['done', 'aborted'])
+    with arm:
+        smach.StateMachine.add('GRASP', Scripted('aborted'), {'ok': 'done', 'preempted': 'aborted'})
+    expert = FakeExpert(goto('A', container='TOP'))
+    seen = []
+    looks = Scripted('ok', lambda state, ud: seen.append(arm.preempt_requested()) or 'ok')
+    machine = chain(A=looks, ARM=arm)
+    watched = Watched(machine, name='TOP', expert=expert, settings={'max_recoveries': 0})
+    assert watched.run() == 'done' and seen == [False]
+    assert ('warn', "TOP/ARM: raised ValueError('cannot clear') when it was left") in log
+
+
 class Twice(smach.StateMachine):
     """Does all its work twice."""
 
