@@ -267,6 +267,31 @@ def test_in_one_process_a_kept_trial_goes_on_and_a_dropped_one_leaves_nothing(tm
         assert set(ALL) == set(killed.diary.count('ends'))
 
 
+def wrapped(killed, **settings):
+    return OracleContainer.wrap(
+        flat(killed.diary, lambda: None),
+        name='TOP',
+        settings={'checkpoint': killed.store, 'checkpoint_synchronous': 'OFF', **settings},
+    )
+
+
+def test_the_active_state_of_a_trial_that_is_kept_is_the_one_in_which_it_stands(tmp_path):
+    killed = KilledMachine(tmp_path, flat)
+    killed.run(kill_at=4)
+    machine = wrapped(killed, on_resume='ask')
+    assert machine.execute() is None and machine.get_active_states() == ['A']
+
+
+def test_a_preempt_before_it_goes_on_ends_the_state_in_doubt_and_is_no_failure(tmp_path):
+    killed = KilledMachine(tmp_path, flat)
+    killed.run(kill_at=4)
+    machine, kinds = wrapped(killed, on_resume='recover'), []
+    machine.events.observers.append(lambda event: kinds.append(event.kind.name))
+    machine.request_preempt()
+    assert machine.execute() == 'aborted'
+    assert kinds[2:4] == ['PREEMPT', 'TRANSITION'] and 'FAILURE' not in kinds
+
+
 def test_a_trial_whose_minutes_are_over_is_kept_and_nobody_is_asked(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), tree, on_resume='ask')
     killed.run(kill_at=30)
