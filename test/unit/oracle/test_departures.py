@@ -197,6 +197,15 @@ def test_what_a_container_raises_as_it_is_left_is_told_and_its_preempt_taken_bac
     assert ('warn', "TOP/ARM: raised ValueError('cannot clear') when it was left") in log
 
 
+def test_a_container_has_serviced_its_preempt_as_it_ends_for_being_left():
+    arm, seen = chain(GRASP=Scripted('aborted')), []
+    arm.register_termination_cb(lambda *_: seen.append(arm.preempt_requested()))
+    expert = FakeExpert(goto('A', container='TOP'))
+    machine = chain(A=Scripted(), ARM=arm)
+    watched = Watched(machine, name='TOP', expert=expert, settings={'max_recoveries': 0})
+    assert watched.run() == 'done' and seen == [False, False]
+
+
 class Twice(smach.StateMachine):
     """Does all its work twice."""
 
