@@ -5,6 +5,7 @@ import os
 import pytest
 from guarded_machines import both, chain
 from machines import FakeExpert, Gate, Scripted, Watched, give_up, goto
+from test_preempt_and_shutdown import NotesOnly
 
 import smach
 from smach_oracle.oracle.records.events import EventKind
@@ -197,8 +198,11 @@ def test_what_a_container_raises_as_it_is_left_is_told_and_its_preempt_taken_bac
     assert ('warn', "TOP/ARM: raised ValueError('cannot clear') when it was left") in log
 
 
-def test_a_container_has_serviced_its_preempt_as_it_ends_for_being_left():
-    arm, seen = chain(GRASP=Scripted('aborted')), []
+@pytest.mark.parametrize('kind', [smach.StateMachine, NotesOnly])
+def test_a_container_has_serviced_its_preempt_as_it_ends_for_being_left(kind):
+    arm, seen = kind(['done', 'aborted']), []
+    with arm:
+        smach.StateMachine.add('GRASP', Scripted('aborted'), {'ok': 'done', 'preempted': 'aborted'})
     arm.register_termination_cb(lambda *_: seen.append(arm.preempt_requested()))
     expert = FakeExpert(goto('A', container='TOP'))
     machine = chain(A=Scripted(), ARM=arm)
