@@ -7,7 +7,7 @@ from branch_machines import iterator_over
 from guarded_machines import OUTCOMES, chain
 from held_machines import Held
 from machines import FakeExpert, Scripted, Watched, chain_of, goto, watched
-from test_still_running import asked
+from test_still_running import SOON, asked
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -209,3 +209,20 @@ def test_a_container_says_in_which_state_it_begins_where_it_was_led_to_one():
     assert machine.run() == 'done'
     begins = [event.state for event in machine.of(EventKind.CONTAINER_START)]
     assert begins == ['IN', 'X', 'Y']
+
+
+def test_a_visit_that_comes_by_itself_is_asked_about_no_more():
+    """The one before was by the oracle. A copy of the userdata is made at each."""
+
+    def takes_long(state, ud):
+        assert not threading.Event().wait(0.2)  # four times as long as it takes to ask
+        return 'ok'
+
+    expert = FakeExpert(goto('A'))
+    state = Scripted('aborted', 'again', takes_long, outcomes=('ok', 'aborted', 'again'))
+    bare = chain(A=state)
+    bare._transitions['A']['again'] = 'A'
+    settings = dict(SOON, max_recoveries=0, deep_copy_keys=['x'])
+    machine = Watched(bare, expert=expert, settings=settings)
+    assert machine.run() == 'done' and machine.visits() == ['A'] * 3
+    assert len(expert.questions) == 1
