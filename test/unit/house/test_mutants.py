@@ -183,6 +183,9 @@ def left():
 def shared():
     return 7
 
+def times_nine(a):
+    return a * 9
+
 def waits(event):
     while not event.is_set():
         event.wait(0.01)
@@ -235,6 +238,17 @@ def test_odd():
 
 def test_check():
     assert m.check(150) and not m.check(300)
+
+BEGUN = []
+
+def test_begun():
+    BEGUN.append(1)
+
+def test_goes_on():
+    assert BEGUN and m.times_nine(1) < 81
+
+def test_times_nine():
+    assert m.times_nine(2) == 18
 
 KEPT = []
 
@@ -305,6 +319,7 @@ def test_mutants_are_killed_or_live_as_the_tests_are(workshop):
             '((value > least) or (value < most))': 'killed',
         },
         'super().__init__()': {'pass': 'killed'},  # the function is another closure without it
+        'a * 9': {'(a / 9)': 'killed'},  # another test fails with and without it
         'len(found) < to': {'len(found) >= to': 'killed'},
         'found.append(bytes(1 << 22))': {'pass': 'hung'},
         'not event.is_set()': {'(event.is_set())': 'hung'},

@@ -141,13 +141,17 @@ def _try(copy: Copy, below: str, mutant: Mutant, reaches: List[Reach]) -> Trial:
     copy.collect()
     try:
         for run in _in_runs(tests, of_files):
-            path.write_text(mutant.applied(original), 'utf-8')
-            verdict, by, run_s = _verdict_of(copy, path, run)
-            took_s += run_s
-            path.write_text(original, 'utf-8')
-            # tests that were never together before may disturb each other
-            if verdict and not _verdict_of(copy, path, _up_to(by, run))[0]:
-                return Trial(mutant, verdict, by, len(tests), took_s)
+            while run:
+                path.write_text(mutant.applied(original), 'utf-8')
+                verdict, by, run_s = _verdict_of(copy, path, run)
+                took_s += run_s
+                path.write_text(original, 'utf-8')
+                if not verdict:
+                    break
+                if not _verdict_of(copy, path, _up_to(by, run))[0]:
+                    return Trial(mutant, verdict, by, len(tests), took_s)
+                # tests that were never together before may disturb each other: without that one
+                run = _without(by, run)
     finally:
         path.write_text(original, 'utf-8')
     return Trial(mutant, 'survived' if tests else 'unreached', '', len(tests), took_s)
@@ -194,6 +198,12 @@ def _up_to(last: str, tests: List[Reach]) -> List[Reach]:
     """Return the tests that ran before one, and that one; all of them where it is none of them."""
     named = [each.test for each in tests]
     return tests[: named.index(last) + 1] if last in named else tests
+
+
+def _without(test: str, tests: List[Reach]) -> List[Reach]:
+    """Return the tests without one, or without its file; none of them where it is none of them."""
+    rest = [each for each in tests if each.test not in (test, test.split('::')[0])]
+    return rest if len(rest) < len(tests) else []
 
 
 def _verdict_of(copy: Copy, module: Path, tests: Sequence[Reach]) -> Tuple[str, str, float]:
