@@ -68,7 +68,6 @@ def _put_in_order(machine: smach.StateMachine, arguments: WrapArguments) -> None
     top = marked_node(machine)
     top.in_force.strict, top.in_force.nested = arguments.strict, arguments.nested
     adopt(machine)
-    _configure(machine, arguments.settings)
     for node in nodes_of(machine):
         node.in_force.strict = arguments.strict
     for node in nodes_of(machine):
