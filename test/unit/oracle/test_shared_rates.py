@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from killed_machines import KilledMachine
 from killed_trees import flat
-from machines import Scripted, Watched, chain_of
+from machines import FakeExpert, Scripted, Watched, chain_of, supersede
 
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS, base_of, merged
@@ -277,7 +277,7 @@ import sys
 sys.path[:0] = {path!r}
 import smach
 smach.set_loggers(*[lambda text: None] * 4)
-from machines import Scripted, Watched, chain_of
+from machines import FakeExpert, Scripted, Watched, chain_of, supersede
 path, name, runs = sys.argv[1], sys.argv[2], int(sys.argv[3])
 state = Scripted()
 machine = Watched(chain_of(state), name=name, settings={{'rates_file': path}})
@@ -385,16 +385,28 @@ def test_a_failure_that_is_taken_back_is_taken_out(kind):
     assert found.get('window', [0, 0, 0]) == [0, 0, 0]
 
 
-def test_a_failure_that_comes_in_place_of_one_that_is_taken_back_counts_once():
-    mine = estimator('window', [False, True])
-    base = base_of(mine.snapshot())
-    others = estimator('window', [False, True, False]).snapshot()
-    mine.take_back_failure()
-    for failed in (False, True):
-        mine.add(failed)
-    found = merged(mine.snapshot(), base, others, 5)
-    assert (found['successes'], found['failures']) == (3, 1)
-    assert sorted(found['window']) == [0, 0, 0, 1]
+def test_a_failure_that_the_results_of_others_have_pushed_out_is_taken_back(tmp_path):
+    path = tmp_path / 'rates.json'
+
+    def while_others_run(state, ud):
+        others = machine(path, 'TASK', [], [], memory=5)
+        for _ in range(5):
+            others.run()
+        return 'again'
+
+    task = chain_of(
+        Scripted('aborted', 'aborted'), Scripted(while_others_run, outcomes=('ok', 'again'))
+    )
+    task._transitions['B']['again'] = 'A'
+    watched = Watched(
+        task,
+        name='TASK',
+        expert=FakeExpert(supersede('ok'), supersede('ok')),
+        settings={'rates_file': str(path), 'policy': 'always_ask', 'memory': 5},
+    )
+    assert watched.run() == 'done'
+    assert (watched.rate('A').successes, watched.rate('A').failures) == (5, 0)
+    assert learned(path, 'TASK') == (5, 0)
 
 
 @pytest.fixture
@@ -428,3 +440,13 @@ def test_a_record_that_a_reader_makes_too_late_is_forgotten_with_its_rates(tmp_p
     own = machine(path, 'TASK', [])
     meanwhile.append(own.run)
     assert [own.rate('A').successes for _ in range(2)] == [2, 2] and not meanwhile
+
+
+@pytest.mark.parametrize('kind', sorted(ESTIMATORS))
+def test_a_failure_is_taken_back_from_what_was_handed_on(kind):
+    mine, other = (estimator(kind, [True, True, False, True]) for _ in range(2))
+    before = mine.rate
+    mine.add(True)
+    other.restore(mine.snapshot())
+    other.take_back_failure()
+    assert (other.rate, other.failures) == (pytest.approx(before), 3)

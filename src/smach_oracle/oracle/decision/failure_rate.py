@@ -103,8 +103,9 @@ class FailureRate(_Totals):
 
     def take_back_failure(self) -> None:
         """Unlearn the latest result, which must have been a failure, in O(1)."""
-        self._failed.pop()
-        self._results -= 1
+        if self._failed:  # else the results of others have pushed it out, who share the rate
+            self._failed.pop()
+            self._results -= 1
         self.failures -= 1
 
     def _forget(self, before: int) -> None:
@@ -219,6 +220,8 @@ class ExponentialFailureRate(_Totals):
         is_own = learned.get('estimator') == self.kind
         rate = _rate(learned, self.prior) if is_own else self.prior
         self.successes, self.failures, self._rate = successes, failures, rate
+        if self.memory > 1:  # as it was if the latest result was a failure: no other is taken back
+            self._before = max(0.0, (rate * self.memory - 1.0) / (self.memory - 1))
 
 
 def _totals(learned: Learned) -> Tuple[int, int]:
@@ -317,7 +320,7 @@ def _merged(own: Learned, base: Learned, theirs: Learned, memory: int) -> Snapsh
 
 
 def _latest(window: List[int], count: int, failures: int) -> List[int]:
-    if failures <= 0:  # one that was taken back may stand for one that came since
+    if failures < 0:
         return [0] * count
     return window[-count:] if count else []
 
