@@ -333,9 +333,7 @@ def test_an_experts_port_that_breaks_is_no_answer():
 
 
 def test_an_interface_whose_port_breaks_ends_the_question():
-    machine = offered_hand(
-        FakeExpert(interface('hand'), goto('B'), interface=lambda *args: 1 / 0)
-    )
+    machine = offered_hand(FakeExpert(interface('hand'), goto('B'), interface=lambda *args: 1 / 0))
     assert machine.run() == 'aborted'
     assert 'ZeroDivisionError' in machine.of(EventKind.WARNING)[0].text
     assert machine.of(EventKind.QUERY_EXPIRED)[0].text.startswith("the expert's port failed")

@@ -374,7 +374,7 @@ def test_a_state_has_the_time_limit_of_the_state_whose_precondition_it_is():
     machine = machine_with(Scripted(gate), **BRIEF)
     assert in_thread(machine.run).result() == 'done'
     assert ends(machine) == [('Scripted', 'not met')]
-    assert machine.of(EventKind.PRECONDITION_END)[0].text.startswith('overran its time limit of 0.1')
+    assert machine.of(EventKind.PRECONDITION_END)[0].text.startswith('overran its time limit of 0.')
 
 
 def test_a_state_that_ignores_the_end_of_its_time_is_left_behind():

@@ -275,8 +275,6 @@ def test_an_iterator_whose_userdata_is_thrown_away_takes_what_is_given_from_abov
         return goto('ALL', container='TOP')
 
     iterator = over(Scripted('ok', 'stuck', outcomes=('ok', 'stuck')))
-    watched, left = total_of(
-        machine_of(iterator), throw_away, policy='always_ask', userdata='keep'
-    )
+    watched, left = total_of(machine_of(iterator), throw_away, policy='always_ask', userdata='keep')
     assert left == (0, []) and iterator.userdata.total == 0
     assert told(watched) == WITH_2

@@ -230,9 +230,7 @@ class TriesFirst(smach.Iterator):
 
 
 def test_a_state_that_fails_before_the_first_item_passes_over_none():
-    iterator = TriesFirst(
-        OUTCOMES, [], [], it=(1, 2), it_label='item', exhausted_outcome='done'
-    )
+    iterator = TriesFirst(OUTCOMES, [], [], it=(1, 2), it_label='item', exhausted_outcome='done')
     with iterator:
         each = Scripted('aborted', 'ok', 'aborted')
         smach.Iterator.set_contained_state('EACH', each, break_outcomes=['preempted'])
