@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+HERE = os.path.dirname(os.path.abspath(__file__))
+sys.path.insert(0, HERE)
 
 from fake_clock import FakeClock
 
@@ -26,8 +27,7 @@ def pytest_collection_modifyitems(items):
     if os.environ.get('SMACH_UPSTREAM'):
         return
     for item in items:
-        is_here = os.path.dirname(os.path.abspath(__file__)) in str(item.fspath)
-        if is_here and item.get_closest_marker('filterwarnings') is None:
+        if HERE in str(item.fspath) and item.get_closest_marker('filterwarnings') is None:
             item.add_marker(pytest.mark.filterwarnings(FAILS))
 
 

@@ -98,29 +98,40 @@ def test_a_goal_that_has_ended_when_the_next_state_begins_is_forgotten(tmp_path)
     assert killed.diary.count('ends')['reach of /arm'] == 1
 
 
+def twice(does):
+    """A machine of A and B, each of which does the same."""
+    machine = smach.StateMachine(['succeeded'])
+    with machine:
+        for label, following in (('A', 'B'), ('B', 'succeeded')):
+            state = smach.CBState(does, outcomes=['succeeded'])
+            smach.StateMachine.add(label, state, {'succeeded': following})
+    return machine
+
+
+def facts_of(goal, path, trial=1):
+    """What the store of a machine says of a goal."""
+    with contextlib.closing(StoreFile(path, read_only=True)) as store:
+        return [each for each in store.facts(trial) if each.name == 'goal:' + goal]
+
+
 def test_a_goal_is_stored_as_it_is_sent_and_once_it_has_ended(tmp_path):
     def sends(userdata):
         GOALS.begin('look', '/camera')
         GOALS.end('look')
         return 'succeeded'
 
-    machine = smach.StateMachine(['succeeded'])
-    with machine:
-        for label, following in (('A', 'B'), ('B', 'succeeded')):
-            state = smach.CBState(sends, outcomes=['succeeded'])
-            smach.StateMachine.add(label, state, {'succeeded': following})
+    machine = twice(sends)
     path = str(tmp_path / 'robot.db')
     for _ in range(2):
         OracleContainer.wrap(machine, settings={'checkpoint': path}).execute()
-    with contextlib.closing(StoreFile(path, read_only=True)) as store:
-        for trial in (1, 2):
-            facts = [each for each in store.facts(trial) if each.name == 'goal:look']
-            assert [(each.kind, each.value.text) for each in facts] == [
-                ('GOAL', '"/camera"'),
-                ('STATE_START', None),
-                ('GOAL', '"/camera"'),
-                ('TRIAL_END', None),
-            ]
+    for trial in (1, 2):
+        facts = facts_of('look', path, trial)
+        assert [(each.kind, each.value.text) for each in facts] == [
+            ('GOAL', '"/camera"'),
+            ('STATE_START', None),
+            ('GOAL', '"/camera"'),
+            ('TRIAL_END', None),
+        ]
 
 
 def test_a_goal_that_runs_as_a_trial_begins_is_stored_until_it_has_ended(tmp_path, log):
@@ -128,19 +139,14 @@ def test_a_goal_that_runs_as_a_trial_begins_is_stored_until_it_has_ended(tmp_pat
         GOALS.end('lift')
         return 'succeeded'
 
-    machine = smach.StateMachine(['succeeded'])
-    with machine:
-        for label, following in (('A', 'B'), ('B', 'succeeded')):
-            state = smach.CBState(ends, outcomes=['succeeded'])
-            smach.StateMachine.add(label, state, {'succeeded': following})
+    machine = twice(ends)
     path = str(tmp_path / 'robot.db')
     GOALS.keep('lift', '/torso')
     OracleContainer.wrap(machine, settings={'checkpoint': path}).execute()
     GOALS.begin('after', '/torso')
     GOALS.end('after')
     assert not [text for level, text in log if level in ('warn', 'err')], 'nobody stores it'
-    with contextlib.closing(StoreFile(path, read_only=True)) as store:
-        facts = [each for each in store.facts(1) if each.name == 'goal:lift']
+    facts = facts_of('lift', path)
     assert [(each.kind, each.label, each.value.text) for each in facts] == [
         ('TRIAL_START', '', '"/torso"'),
         ('STATE_START', 'B', None),
