@@ -59,7 +59,7 @@ def _link(joint: Joint, place: np.ndarray, turn: np.ndarray) -> LinkTransform:
 
 def _numbers(vector: np.ndarray) -> Tuple[float, ...]:
     # numpy's types may take the list for a text
-    return tuple(cast(List[float], vector.tolist()))
+    return tuple(cast('List[float]', vector.tolist()))
 
 
 def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:

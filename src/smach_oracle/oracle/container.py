@@ -133,7 +133,7 @@ class OracleContainer(smach.StateMachine):
         within = checked.nested if nested is None else checked_nested('nested', nested)
         arguments = WrapArguments(checked, within, name, strict)
         wrapped = wrap_machine(cls, machine, tree, arguments)
-        return cast(OracleContainer, wrapped)
+        return cast('OracleContainer', wrapped)
 
     @staticmethod
     def add(

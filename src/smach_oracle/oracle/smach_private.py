@@ -213,13 +213,13 @@ def initial_label_of(container: object) -> str:
 
 def transitions_in(container: object, label: str) -> Transitions:
     """Return where the outcomes of a state lead."""
-    tables = cast(Dict[str, Optional[Transitions]], own_mark(container, '_transitions') or {})
+    tables = cast('Dict[str, Optional[Transitions]]', own_mark(container, '_transitions') or {})
     return tables.get(label) or {}
 
 
 def remapping_of(container: object, label: str) -> Mapping[str, str]:
     """Return the container's names of a state's keys."""
-    tables = cast(Dict[str, Mapping[str, str]], own_mark(container, '_remappings') or {})
+    tables = cast('Dict[str, Mapping[str, str]]', own_mark(container, '_remappings') or {})
     return tables.get(label) or {}
 
 

@@ -414,7 +414,7 @@ def has_introspection(machine: OracleContainer) -> bool:
     callbacks = [
         each[0]
         for name in CALLBACK_LISTS
-        for each in cast(List[Tuple[object, ...]], own_mark(machine, name) or [])
+        for each in cast('List[Tuple[object, ...]]', own_mark(machine, name) or [])
     ]
     return is_watched(machine) or any(_is_running_proxy(callback) for callback in callbacks)
 

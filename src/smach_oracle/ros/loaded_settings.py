@@ -74,7 +74,7 @@ class LoadedSettings(Dict[str, Any]):
     def overridden_by(self, values: Mapping[str, Any]) -> List[str]:
         """Return the values that `put` would replace, such as "max_recoveries: 5, now 0"."""
         mine, theirs = (
-            dict(_leaves(cast(Mapping[str, object], plain(each)))) for each in (self, values)
+            dict(_leaves(cast('Mapping[str, object]', plain(each)))) for each in (self, values)
         )
         return [
             '{}: {!r}, now {!r}'.format(key, mine[key], value)

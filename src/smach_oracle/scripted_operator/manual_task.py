@@ -121,7 +121,7 @@ def _driven(task: ManualTask, interfaces: OperatorInterfaces) -> str:
             interfaces.means,
             task.number,
             # an array, which numpy's types may take for one number
-            lambda: cast(np.ndarray, task.generator.normal(0.0, _MISJUDGED)),
+            lambda: cast('np.ndarray', task.generator.normal(0.0, _MISJUDGED)),
         )
 
     try:

@@ -63,6 +63,6 @@ def scene_of(image: CameraImage, segmented: SegmentedObject) -> MarkedScene:
     others.sort(key=lambda box: float(np.hypot(*box.centre[:2])))
     top = upright_box(patch, float(patch[:, 2].min()))
     # elements, which numpy's types may take for arrays
-    x, y = cast(Tuple[float, float], top.centre[:2])
+    x, y = cast('Tuple[float, float]', top.centre[:2])
     centre = np.array([x, y, plane.z_at(x, y)])
     return MarkedScene(UprightBox(centre, top.size * [1, 1, 0], top.yaw), others)

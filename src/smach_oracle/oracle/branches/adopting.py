@@ -88,7 +88,7 @@ def _new_branch(wrapper: ContainerWrapper, label: str) -> Branch:
     is_item = isinstance(wrapper, IteratorWrapper)
     branch = Branch(label, is_alone=is_item)
     site = partial(IteratorSite if is_item else BranchSite, container=container, label=label)
-    machine = cast(smach.StateMachine, branch)
+    machine = cast('smach.StateMachine', branch)
     node = TreeNode(machine, parent.tree, parent.settings, '', site)
     set_mark(branch, node)
     renew_attributes(branch)

@@ -201,7 +201,7 @@ class Branch(smach.Container):
 
     def _step_to_end(self, end: Optional[End]) -> Optional[str]:
         """Step as any wrapped machine does."""
-        step, machine = self._oracle.tree.container_class, cast(smach.StateMachine, self)
+        step, machine = self._oracle.tree.container_class, cast('smach.StateMachine', self)
         with self._state_transitioning_lock:
             self._is_running = True
             if end is None:

@@ -145,7 +145,7 @@ def is_failure_above(node: TreeNode, outcome: str) -> bool:
     labels = node.labels_from_parent
     if len(labels) != 1:
         return outcome in node.in_force.failing
-    parent = cast(TreeNode, node.parent)
+    parent = cast('TreeNode', node.parent)
     return judged_at(parent, labels[0], outcome)[1] is not FailureKind.NOT_A_FAILURE
 
 

@@ -90,7 +90,7 @@ class BranchStandIn:
         return getattr(self.state_of_stand_in, name)
 
     # that of the user's state: upstream's Iterator, and users, ask for it by `isinstance`
-    __class__ = cast(Any, property(lambda self: type(self.state_of_stand_in)))
+    __class__ = cast('Any', property(lambda self: type(self.state_of_stand_in)))
 
 
 def _users_state(state: object) -> Any:

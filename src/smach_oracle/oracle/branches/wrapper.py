@@ -212,14 +212,14 @@ class ContainerWrapper:
 
 def wrapper_of(state: object) -> Optional[ContainerWrapper]:
     """Return what is kept beside a Concurrence or an Iterator, or None for anything else."""
-    return cast(Optional[ContainerWrapper], nesting.wrapper_of(state))
+    return cast('Optional[ContainerWrapper]', nesting.wrapper_of(state))
 
 
 def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
     """Return them, each with its path, the outermost first."""
     if not node.runs_in_branch:
         return []
-    path, found = cast(TreeNode, node.parent).key, []
+    path, found = cast('TreeNode', node.parent).key, []
     for link in links_to(node):
         path = '{}/{}'.format(path, link.label)
         wrapper = wrapper_of(link.inner_container)

@@ -326,7 +326,7 @@ class Checkpointer:
 
         They are those around the failed state, whose container the machine may have left.
         """
-        data = cast(Mapping[str, object], jump.data)  # each jump has some
+        data = cast('Mapping[str, object]', jump.data)  # each jump has some
         path, _, label = str(data.get(JUMPED_FROM, '')).rpartition('/')
         failed = self._known_node(path, label) or node
         for each in (failed, *failed.around()):

@@ -117,7 +117,7 @@ class ContainerFacts:
             state, outcome, result = visits[number - total]
             # as many names as visits are kept, so that the store does not grow with each
             yield from self._if_new(
-                '{}{}'.format(VISIT, number % cast(int, visits.maxlen)),
+                '{}{}'.format(VISIT, number % cast('int', visits.maxlen)),
                 [state, outcome, int(result), self._execution, number],
             )
         self._visits = total
@@ -253,7 +253,7 @@ def _print_of(value: object) -> Optional[bytes]:
     """Return bytes that differ where plain data differ, or None for anything else."""
     try:
         # to compare, never loaded. It raises for a value of another type than plain ones
-        return marshal.dumps(cast(bytes, value), _WITH_REFERENCES)
+        return marshal.dumps(cast('bytes', value), _WITH_REFERENCES)
     except BaseException as err:  # a value that lends its memory may raise anything
         if ends_program(err):
             raise

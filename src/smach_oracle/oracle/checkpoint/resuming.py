@@ -432,7 +432,7 @@ class _Setting:
         snapshots = self._resumption.tree.container(node.path).snapshots
         kind, outcome, text = FailureKind.INTERRUPTED, '', STOPPED
         if stored.phase == FAILED:
-            number, outcome, text = cast(Tuple[int, str, str], stored.at[2:5])
+            number, outcome, text = cast('Tuple[int, str, str]', stored.at[2:5])
             if outcome and outcome not in transitions_of(node.machine).get(stored.label, ()):
                 outcome, text = '', GONE.format('outcome ' + outcome)
             else:

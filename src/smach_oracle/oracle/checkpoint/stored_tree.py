@@ -107,7 +107,7 @@ class StoredContainer:
     @property
     def at_there(self) -> List[object]:
         """Return how it stands there."""
-        return cast(List[object], self.at[3])
+        return cast('List[object]', self.at[3])
 
     @property
     def jumped_to(self) -> str:
@@ -218,10 +218,10 @@ class _Reading:
             # of an earlier version the name says when
             execution, number = map(int, when or of.split(':'))
             self._visits.setdefault(path, {})[execution, number] = Visit(
-                str(state), str(outcome), VisitResult(cast(int, result))
+                str(state), str(outcome), VisitResult(cast('int', result))
             )
         elif word == names.STATE:
-            told = container.states[of] = _plain(value, cast(StoredState, {}))
+            told = container.states[of] = _plain(value, cast('StoredState', {}))
             if 'mark' in told:  # of an earlier version
                 container.marks[of] = told['mark']
         elif word == names.WAYS:
@@ -234,7 +234,7 @@ class _Reading:
             if container.phase == names.MOVED:
                 path, at = container.moved_to.rpartition('/')[0], container.at_there
             is_sent = fact.kind == names.EDIT
-            container.sent = (cast(List[str], at[3]) if at[3:] else []) if is_sent else None
+            container.sent = (cast('List[str]', at[3]) if at[3:] else []) if is_sent else None
             # it has begun, also where the machine is sent elsewhere later
             if at and at[1] in (names.IN, names.FAILED):
                 there = self._tree.containers.setdefault(path, StoredContainer())

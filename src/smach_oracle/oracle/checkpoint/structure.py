@@ -81,7 +81,7 @@ def differences(stored: str, now: str) -> List[str]:
 
 def _pairs(before: object, after: object) -> Iterator[Tuple[str, Optional[Plain], Optional[Plain]]]:
     """Yield what two mappings have under each name, None where one of them has it not."""
-    one, other = cast(Mapping[str, Plain], before), cast(Mapping[str, Plain], after)
+    one, other = cast('Mapping[str, Plain]', before), cast('Mapping[str, Plain]', after)
     for name in sorted({*one, *other}):
         yield name, one.get(name), other.get(name)
 

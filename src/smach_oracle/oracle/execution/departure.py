@@ -55,7 +55,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
 def _in_words(verdict: Verdict) -> str:
     if isinstance(verdict, JumpTo):
         return verdict.jump_path.entered_places[-1].path
-    return 'its end with {}'.format(cast(GiveUp, verdict).ending.outcome)
+    return 'its end with {}'.format(cast('GiveUp', verdict).ending.outcome)
 
 
 def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
@@ -98,7 +98,7 @@ def _claim(nodes: List[TreeNode], departure: Departure) -> Tuple[List[TreeNode],
             len(nodes),
         )
         others = nodes[first:]
-        leaving = cast(Departure, others[0].execution.departure) if others else departure
+        leaving = cast('Departure', others[0].execution.departure) if others else departure
         for each in nodes[:first]:
             each.execution.depart_by(leaving)
     for each in nodes[1:first]:
@@ -132,7 +132,7 @@ def take_departure(node: TreeNode) -> Optional[Departure]:
     """Return the departure that the end of the present state is part of, once."""
     if node.execution.departure is None:
         return None
-    departure = cast(Departure, node.execution.departure)
+    departure = cast('Departure', node.execution.departure)
     node.execution.depart_by(None)
     stops = departure.arrives_at.execution.scope.reason is not None
     return None if stops else departure

@@ -139,7 +139,7 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
         named += [
             ('states.{}.{}'.format(name, key), name, each, UnfitKind.CHECKED)
             for name, given in settings.states.items()
-            for each in cast(Tuple[str, ...], given.get(key, ()))
+            for each in cast('Tuple[str, ...]', given.get(key, ()))
         ]
     for key, name, outcome, kind in named:
         known = _outcomes_of(top, name)
@@ -187,7 +187,7 @@ def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...
     # labels given for all states of this label are meant for others: none is beside a branch
     path = '{}/{}'.format(node.relative_path, label)
     given = node.settings.states.get(path, {}).get('preconditions', ())
-    return cast(Tuple[PreconditionSpec, ...], given)
+    return cast('Tuple[PreconditionSpec, ...]', given)
 
 
 def _complain(node: TreeNode, unfit: UnfitName) -> None:

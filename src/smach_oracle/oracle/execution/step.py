@@ -109,7 +109,7 @@ class Step:
             outcome, error = outcome.outcome, outcome.error
         judged = judge(node, record, outcome, error)
         if isinstance(outcome, Unfinished):
-            return self._unfinished(cast(Failure, judged), outcome)
+            return self._unfinished(cast('Failure', judged), outcome)
         reason = node.execution.scope.reason
         stopping = reason is not None or ends_program(error)
         # a request that comes from here on has come after the end of the state
@@ -318,7 +318,7 @@ class Step:
         if record.failure_class is not FailureClass.HIGH:
             return
         if node.records.history.keeps_failing(record.label):
-            target = cast(Route, failure.route).target  # by which the author recovers
+            target = cast('Route', failure.route).target  # by which the author recovers
             node.warn_once('own loop', OWN_LOOP.format(failure.outcome, target), record.label)
 
     # -- without the oracle
@@ -414,7 +414,7 @@ class Step:
             facts = _facts_of(occasion, record.label)
             node.emit(EventKind.TRANSITION, record.label, occasion.outcome, meta_label, **facts)
         # sync_oracle refuses any other state of this name
-        meta = cast(OracleState, states_of(self._machine)[meta_label])
+        meta = cast('OracleState', states_of(self._machine)[meta_label])
         go_to(node, message_of(record.label, occasion.what, meta_label), meta_label)
         return meta
 

@@ -122,7 +122,7 @@ class TrackedItems:
         items = iter(self._source())
         if items is self._items:
             self._tell('what it goes through can be iterated only once, and has raised an error')
-            raise cast(Exception, self._error)
+            raise cast('Exception', self._error)
         for _ in range(self.number):
             next(items, None)  # it may raise again: the next time begins here once more
         self._items, self._error = items, None
@@ -131,7 +131,7 @@ class TrackedItems:
         again = [self._item] if self._is_pending else []
         self.number -= len(again)
         try:
-            for item in itertools.chain(again, cast(Iterator[object], self._items)):
+            for item in itertools.chain(again, cast('Iterator[object]', self._items)):
                 self._item = item
                 self.number += 1
                 self.is_finished = False
@@ -152,10 +152,10 @@ class TrackedItems:
     # -- to others it is what was given
 
     def __len__(self) -> int:
-        return len(cast(Sized, self.given))
+        return len(cast('Sized', self.given))
 
     def __getitem__(self, index: object) -> object:
-        return cast(Any, self.given)[index]
+        return cast('Any', self.given)[index]
 
     def __bool__(self) -> bool:
         return bool(self.given)

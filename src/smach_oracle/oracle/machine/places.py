@@ -64,7 +64,7 @@ def links_to(node: TreeNode) -> Iterator[ContainerLink]:
     """
     outer: smach.Container = (node.parent or node).machine
     for label in node.labels_from_parent:
-        inner = cast(smach.Container, children_of(outer)[label])
+        inner = cast('smach.Container', children_of(outer)[label])
         yield ContainerLink(outer, label, inner)
         outer = inner
 

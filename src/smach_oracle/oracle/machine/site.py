@@ -109,7 +109,7 @@ class Site:
 
     def shown(self) -> smach.Container:
         """Return the container that people see."""
-        return cast(smach.Container, self._node.machine)
+        return cast('smach.Container', self._node.machine)
 
     # -- settings
 

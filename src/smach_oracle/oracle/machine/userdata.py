@@ -271,7 +271,7 @@ def view_of(
     `label` is '' for a state that is not in the machine.
     """
     if label and own_mark(machine, 'hands_on_userdata'):
-        return cast(smach.Remapper, userdata)  # as an Iterator does
+        return cast('smach.Remapper', userdata)  # as an Iterator does
     remapping = remapping_of(machine, label) if label else {}
     return smach.Remapper(
         userdata, state.get_registered_input_keys(), state.get_registered_output_keys(), remapping

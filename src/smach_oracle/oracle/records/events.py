@@ -230,6 +230,6 @@ def _in_words(observer: Observer) -> Tuple[str, str]:
     is_method = type(observer) is MethodType
     owner: object = getattr(observer, '__self__', None) if is_method else observer
     if issubclass(type(owner), OwnObserver):  # `isinstance` would ask a property of the user's
-        own = cast(OwnObserver, owner)
+        own = cast('OwnObserver', owner)
         return own.observer_name, own.without_it
     return 'the observer {}'.format(repr_of(observer)), 'it has missed this event'

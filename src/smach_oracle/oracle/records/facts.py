@@ -109,7 +109,7 @@ def branches_of(event: Event) -> Tuple[str, ...]:
 def last_stored(event: Event) -> int:
     """Return the number of the last event that was stored before a RESUMED one, -1 for none."""
     stated = _stated(event, LAST_SEQ)
-    return cast(int, stated) if is_whole(stated, -1) else -1
+    return cast('int', stated) if is_whole(stated, -1) else -1
 
 
 def is_counted(event: Event) -> bool:

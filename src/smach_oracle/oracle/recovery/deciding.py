@@ -99,7 +99,7 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
     streak = _streak(recovery)
     chosen = _first_way(recovery, situation, ways_on(recovery, why_not_above), streak)
     if chosen is None:
-        why = policy.why(cast(Situation, recovery.situation))
+        why = policy.why(cast('Situation', recovery.situation))
         return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
     spent = _take_recovery(recovery, policy.most_of_trial)
     if spent:  # by others meanwhile

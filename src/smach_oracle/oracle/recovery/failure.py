@@ -140,7 +140,7 @@ def _judge(
         if isinstance(outcome, str) and not node.site.is_container:
             return failure._replace(route=Route(told, False))
         return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
-    outcome = cast(str, outcome)
+    outcome = cast('str', outcome)
     route = route_of(machine, label, outcome)
     kind = failure_kind(outcome, route, record.settings, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:

@@ -21,7 +21,7 @@ def fall_back(recovery: Recovery) -> Verdict:
         problem = _why_not(recovery, way) or recovery.budget.take_recovery()
         if not problem:
             recovery.record.fallbacks += 1
-            return recovery.jump(cast(JumpPath, way), why)
+            return recovery.jump(cast('JumpPath', way), why)
         _warn(recovery, 'cannot go to {!r}: {}; stopping'.format(target, problem))
     elif verb == 'give_up':
         if target in node.machine.get_registered_outcomes():

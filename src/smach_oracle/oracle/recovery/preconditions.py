@@ -188,7 +188,7 @@ def _judge(recovery: Recovery, place: TreePlace, state: smach.State, outcome: ob
         raise NotMet('preempted')
     if not is_registered(state, outcome):
         raise NotMet('returned {}, which is not one of its outcomes'.format(repr_of(outcome)))
-    outcome, node = cast(str, outcome), place.node
+    outcome, node = cast('str', outcome), place.node
     if place.label:
         failed = judged_at(node, place.label, outcome)[1] not in (
             FailureKind.NOT_A_FAILURE,

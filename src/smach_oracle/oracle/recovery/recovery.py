@@ -167,7 +167,7 @@ class Recovery:
         choice = self.choice
         if choice is None:
             return None
-        tried = cast(Situation, self.situation).menu.streak.tried
+        tried = cast('Situation', self.situation).menu.streak.tried
         way, place = choice.ways[0], LATER if tried else FIRST
         return self._gone(way.key, way.kind, place, choice.hoped)
 

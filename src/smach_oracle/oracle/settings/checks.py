@@ -65,7 +65,7 @@ def number(low: float, high: float, allowed: str) -> Check[float]:
     def check(key: str, value: object) -> float:
         if not is_number(value, low, high):
             raise SettingsError(key, value, allowed)
-        return float(cast(float, value))
+        return float(cast('float', value))
 
     return check
 
@@ -76,7 +76,7 @@ def whole(low: int, allowed: str, high: float = math.inf) -> Check[int]:
     def check(key: str, value: object) -> int:
         if not is_whole(value, low, high):
             raise SettingsError(key, value, allowed)
-        return int(cast(int, value))
+        return int(cast('int', value))
 
     return check
 

@@ -160,7 +160,7 @@ def _top(patch: np.ndarray, plane: Plane) -> UprightBox:
     """The table's top, without thickness."""
     box = upright_box(patch, float(patch[:, 2].min()))
     # elements, which numpy's types may take for arrays
-    x, y = cast(Tuple[float, float], box.centre[:2])
+    x, y = cast('Tuple[float, float]', box.centre[:2])
     z = plane.z_at(x, y)
     return box._replace(centre=np.array([x, y, z]), size=box.size * [1, 1, 0])
 

@@ -86,7 +86,7 @@ def why_not_standing(
             name_of(colour), name_of(look.colour)
         )
     # an element, which numpy's types may take for an array
-    tall = 2 * cast(float, half[2])
+    tall = 2 * cast('float', half[2])
     high = float(np.percentile(points[:, 2], 90)) - (centre[2] - half[2])
     in_cm = '{:.0f} cm high, and the object is {:.0f} cm'.format(100 * high, 100 * tall)
     if high < UPRIGHT * tall:

@@ -45,7 +45,7 @@ def best_swing(
     """
     best: Optional[DoorSwing] = None
     # an element, which numpy's types may take for an array
-    first = cast(float, angles[0])
+    first = cast('float', angles[0])
     for _ in range(tries):
         turn = float(generator.uniform(*turns))
         starts = chain.solutions(tool_at(first, turn), seed, generator, restarts=6)

@@ -105,7 +105,7 @@ def _containers_in(container: Any, above: List[object]) -> Iterator[smach.Contai
 
 def _shown_by_upstream(container: smach.Container) -> Iterator[_Shown]:
     """Topics and paths by which upstream's introspection listens for a container."""
-    callbacks = cast(List[Tuple[object, ...]], own_mark(container, '_transition_cbs') or [])
+    callbacks = cast('List[Tuple[object, ...]]', own_mark(container, '_transition_cbs') or [])
     for callback in callbacks:
         if not isinstance(callback[0], types.MethodType):
             continue

@@ -94,7 +94,7 @@ class MachineCheck:
             is_left = isinstance(machine, OracleContainer)
             if not is_left:
                 self._wrap(machine)
-            name = _prepare(cast(OracleContainer, machine), running, self._names.complain)
+            name = _prepare(cast('OracleContainer', machine), running, self._names.complain)
             if is_left:
                 warnings.extend(filter(None, [self._why_left(machine)]))
         self._names.note(sorted_preconditions(machine, oracle_of(machine).settings).placed)

@@ -92,7 +92,7 @@ class _Loader(yaml.SafeLoader):
                     key.tag = _TAG + 'str'
         # the base class refuses any other node, with an error of its own
         mapping: Dict[Any, Any] = yaml.constructor.BaseConstructor.construct_mapping(
-            self, cast(yaml.MappingNode, node), deep=deep
+            self, cast('yaml.MappingNode', node), deep=deep
         )
         return mapping
 

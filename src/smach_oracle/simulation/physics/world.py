@@ -246,7 +246,7 @@ class World:
         self.drives += 1
         generator = np.random.default_rng([self.scene.seed, 101, self.drives])
         # an array, which numpy's types may take for one number
-        drawn = cast(np.ndarray, generator.normal(0.0, self.scene.robot.drive_error))
+        drawn = cast('np.ndarray', generator.normal(0.0, self.scene.robot.drive_error))
         before = np.array(
             [self.belief_error[0, 3], self.belief_error[1, 3], yaw_of(self.belief_error)]
         )

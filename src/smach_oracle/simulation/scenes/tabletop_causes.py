@@ -99,7 +99,7 @@ def _arm_in_view(draft: TabletopDraft, generator: np.random.Generator) -> Option
             + [0.0, generator.uniform(-0.06, 0.02), 0.0]
         )
         # an array, which numpy's types may take for one number
-        angles = cast(np.ndarray, generator.uniform((-1.5, -0.2, -1.6), (1.5, 0.6, -0.2)))
+        angles = cast('np.ndarray', generator.uniform((-1.5, -0.2, -1.6), (1.5, 0.6, -0.2)))
         pose = from_rpy(point, *angles)
         q = chain.inverse(pose, np.array([0.6, 0.2, 1.2, -1.6, 0.0, -0.8, 0.0]), generator)
         if q is not None and point[2] > TABLE_TOP + 0.22:

@@ -184,5 +184,5 @@ def _span(values: np.ndarray) -> Tuple[float, float]:
     if not len(values):
         return 0.0, 1.0
     # an array, which numpy's types may take for one number
-    low, high = (float(each) for each in cast(np.ndarray, np.percentile(values, (2, 98))))
+    low, high = (float(each) for each in cast('np.ndarray', np.percentile(values, (2, 98))))
     return low, max(high, low + 1e-6)

@@ -116,7 +116,7 @@ def _depth_file(depth: np.ndarray, width: int) -> BrowserFile:
     near, far = 0.0, 0.0
     if measured.size:
         # an array, which numpy's types may take for one number
-        near, far = (float(each) for each in cast(np.ndarray, np.percentile(measured, (2, 98))))
+        near, far = (float(each) for each in cast('np.ndarray', np.percentile(measured, (2, 98))))
     return BrowserFile(
         'image/png',
         _file('.png', false_colours(small, near, far), [cv2.IMWRITE_PNG_COMPRESSION, 1]),
