@@ -6,12 +6,12 @@ import smach
 
 from ..decision.ways import RESTORE
 from ..machine.items import TrackedItems
-from ..machine.nesting import children_of, machines_below
+from ..machine.nesting import children_of, containers_of, machines_below
 from ..machine.tree_node import TreeNode, node_of
 from ..machine.userdata import restore, take_snapshot
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
-from ..smach_private import Labels, data_of, items_of, mark_on, states_of
+from ..smach_private import Labels, data_of, items_of, mark_on
 from .wrapper import ContainerWrapper, wrapper_of
 
 
@@ -121,7 +121,7 @@ class IteratorWrapper(ContainerWrapper):
     def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
         self._ended_with = outcome if isinstance(outcome, str) and not self.is_left else None
-        if cast(TrackedItems, self.tracked).is_exhausted:
+        if cast('TrackedItems', self.tracked).is_exhausted:
             # the author has gone on behind it where an oracle has given up
             for _, machine in machines_below(self.container):
                 node = node_of(machine)
@@ -171,7 +171,7 @@ class IteratorWrapper(ContainerWrapper):
             self._given = self._snapshot(given)
             return {}
         if (
-            not cast(TrackedItems, self.tracked).is_finished
+            not cast('TrackedItems', self.tracked).is_finished
             and self.at_item is not None
             and parent.in_force.userdata == RESTORE
         ):
@@ -197,7 +197,7 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
 
     Any other Iterator of the container begins again when it is entered.
     """
-    for label, state in dict(states_of(node.machine)).items():
+    for label, state in containers_of(node.machine):
         wrapper = wrapper_of(state)
         if isinstance(wrapper, IteratorWrapper):
             wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))

@@ -69,7 +69,7 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     """
     missing = missing_on(way, written)
     node, label = way.entered_places[-1]
-    if node is not way.meeting_node:  # keys of its own may have the same names
+    if not missing or node is not way.meeting_node:  # keys of its own may have the same names
         return missing
     remapping = remapping_of(node.machine, label)
     return tuple(key for key in missing if remapping.get(key, key) not in written)
@@ -161,7 +161,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     if why_not:
         node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)
         return False
-    way = cast(JumpPath, way)
+    way = cast('JumpPath', way)
     settle_ways(node, None)
     node.record(label).forget_entry()  # it may have been led to, and is not entered
     entry = prepare_entry(way, jump.written, 'sent')

@@ -29,7 +29,7 @@ def wrapper_of(state: object) -> Optional[Wrapper]:
     A shallow copy has the mark of another one.
     """
     mark = own_mark(state, WRAPPER)
-    return cast(Wrapper, mark) if own_mark(mark, 'container') is state else None
+    return cast('Wrapper', mark) if own_mark(mark, 'container') is state else None
 
 
 def machines_below(
@@ -44,7 +44,7 @@ def machines_below(
     wrapper = None if isinstance(container, smach.StateMachine) else wrapper_of(container)
     if wrapper is not None:
         yield from ((below, each) for each in [*wrapper.branches.values()])
-    for label, state in _containers_of(container):
+    for label, state in containers_of(container):
         if isinstance(state, smach.StateMachine):
             yield below + (label,), state
         else:
@@ -74,7 +74,7 @@ def branching_below(
 
     It looks through them, but not into machines.
     """
-    for label, state in _containers_of(container):
+    for label, state in containers_of(container):
         if not isinstance(state, smach.StateMachine):
             path = below + (label,)
             if isinstance(state, (smach.Concurrence, smach.Iterator)):
@@ -89,7 +89,7 @@ def children_of(container: object) -> Mapping[str, smach.State]:
     return container.get_children() if isinstance(container, smach.Container) else {}
 
 
-def _containers_of(container: object) -> List[Tuple[str, smach.Container]]:
+def containers_of(container: object) -> List[Tuple[str, smach.Container]]:
     """Return those of its states that are containers, by label.
 
     Another thread may add states meanwhile. A copy is one step to it. A list of pairs is not: each

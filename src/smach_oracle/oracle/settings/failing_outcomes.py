@@ -65,6 +65,7 @@ class FailingNames:
         return self.by_name and (is_preempted(outcome) or sounds_like_success(outcome))
 
 
+@lru_cache(_MOST_KNOWN)
 def sounds_like_success(outcome: str) -> bool:
     """Whether an outcome is called a success: that is no failure wherever its author leads it."""
     words = words_of(outcome)
