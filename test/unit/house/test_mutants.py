@@ -349,6 +349,10 @@ def test_no_mutant_sees_one_of_another_module_that_was_tried_before(workshop, fi
     assert [trial.verdict for trial in shop.try_all(mutants, reaches)] == ['killed'] * 2
 
 
+def test_who_only_imports_the_plugin_is_not_watched():
+    assert 'mutating.forking' in sys.modules and sys.getprofile() is None
+
+
 def test_each_test_runs_once_those_of_the_files_that_a_mutant_concerns_first():
     of_subject = [trying.Reach('test_it.py::{}'.format(n), set(), 0.1) for n in range(40)]
     of_others = [trying.Reach('test_all.py::{}'.format(n), set(), 0.1) for n in range(200)]

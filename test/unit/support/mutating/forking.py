@@ -46,7 +46,10 @@ def _note(frame: FrameType, event: str, _: object) -> None:
         has_run.add(frame.f_code)
 
 
-sys.setprofile(_note)
+@pytest.hookimpl(tryfirst=True)
+def pytest_load_initial_conftests() -> None:
+    """Note what runs from now on: conftest.py is imported next. Who only imports this is spared."""
+    sys.setprofile(_note)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
