@@ -431,8 +431,9 @@ class StateMachine(Container):
     # -- copies
 
     def __getstate__(self) -> Dict[str, Any]:
+        attributes = self.__dict__.copy()  # in one step: another thread may execute it meanwhile
         return {
-            key: value for key, value in self.__dict__.items() if key not in StateMachine._UNPICKLED
+            key: value for key, value in attributes.items() if key not in StateMachine._UNPICKLED
         }
 
     def __setstate__(self, state: Dict[str, Any]) -> None:

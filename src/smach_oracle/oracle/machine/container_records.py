@@ -242,10 +242,21 @@ class ContainerRecords:
         """Note in the history that a state has failed, before its visit is added."""
         self.history.failed(record.label, record.totals[0])
 
+    def __getstate__(self) -> Dict[str, object]:
+        """Return copies, each made in one step: another thread may execute it meanwhile."""
+        return {
+            **vars(self),
+            'by_label': self.by_label.copy(),
+            'marks': VisitMarks(self.marks),
+            'streaks': Streaks(self.streaks),
+            'oracle_edges': self.oracle_edges.copy(),
+            'to_come': self.to_come.copy(),
+        }
+
     def twin(self) -> 'ContainerRecords':
         """Return records for a shallow copy of the machine, which learns on its own."""
         twin = ContainerRecords(copy.deepcopy(self.history))
-        twin.by_label = copy.deepcopy(self.by_label)
+        twin.by_label = copy.deepcopy(self.by_label.copy())
         twin.oracle_edges = dict(self.oracle_edges)
         twin.to_come = dict(self.to_come)
         return twin

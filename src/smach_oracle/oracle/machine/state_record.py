@@ -1,5 +1,6 @@
 """The oracle's memory of one state of a container. Pure, and without smach."""
 
+import copy
 import threading
 from typing import (
     TYPE_CHECKING,
@@ -102,7 +103,7 @@ class StateRecord:
         self._visits = 0  # not counted by an FastEdge
         self._visits_before = 0  # visits of earlier trials
         self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
-        self._lock = threading.RLock()  # rates are read from other threads
+        self.renew_lock()  # rates are read from other threads
         self.configure(settings, special)
 
     def configure(self, settings: StateSettings, special: bool) -> None:
@@ -325,15 +326,20 @@ class StateRecord:
         return count
 
     def __getstate__(self) -> Dict[str, object]:
-        """Leave out what belongs to an execution under way."""
+        """Leave out what belongs to an execution under way, which may go on meanwhile."""
         state: Dict[str, object] = {**vars(self), 'snapshot': None, 'view': None, 'way_down': ()}
+        state.update(fast=self.fast.copy(), _edges=self._edges.copy())
         with self._lock:
-            state['_ways'] = self._ways.twin()
+            state.update(_ways=self._ways.twin(), _estimator=copy.deepcopy(self._estimator))
         del state['_lock']
         return state
 
     def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
+        self.renew_lock()
+
+    def renew_lock(self) -> None:
+        """Have a lock that nobody holds: in a forked child, no thread lets go of that of before."""
         self._lock = threading.RLock()
 
     def retire_edges(self) -> None:

@@ -186,7 +186,7 @@ class Tree:
         """
         at_rest = Tree.__new__(Tree)
         at_rest.be_at_rest()
-        return {key: value for key, value in vars(self).items() if key not in vars(at_rest)}
+        return {key: value for key, value in vars(self).copy().items() if key not in vars(at_rest)}
 
     def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)

@@ -10,7 +10,7 @@ come in, so no walk over the chain is ever needed.
 
 from collections import deque
 from itertools import islice
-from typing import Any, Callable, Deque, Iterable, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Deque, Dict, Iterable, NamedTuple, Optional, Tuple
 
 from ..decision.policy import FailureContext
 from .visits import Visit, VisitResult
@@ -41,6 +41,11 @@ class _CountedVisits(Deque[Visit]):
     def clear(self) -> None:
         super().clear()
         self.added = 0
+
+    def copy(self) -> '_CountedVisits':
+        twin = super().copy()
+        twin.added = self.added
+        return twin
 
 
 # state of the latest visit without preconditions, those of the latest successes, and the latest
@@ -236,3 +241,7 @@ class History:
     def latest(self) -> Tuple[Visit, ...]:
         """Return the latest visits, oldest first."""
         return tuple(self.visits)
+
+    def __getstate__(self) -> Dict[str, object]:
+        """Return copies, each made in one step: another thread may add a visit meanwhile."""
+        return {**vars(self), 'visits': self.visits.copy(), '_failures': self._failures.copy()}
