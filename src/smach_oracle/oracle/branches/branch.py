@@ -74,7 +74,7 @@ class Branch(smach.Container):
         label, outcomes = self._initial_state_label, state.get_registered_outcomes()
         self.userdata = container.userdata
         self.state = self._states[label] = state
-        self._remappings[label] = {} if self.hands_on_userdata else remapping_of(container, label)
+        self._remappings[label] = remapping_of(container, label)  # none in an Iterator
         self._outcomes = set(outcomes)
         self._transitions[label] = dict.fromkeys(outcomes)
 
