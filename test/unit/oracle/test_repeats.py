@@ -116,6 +116,18 @@ def test_nobody_to_ask_is_the_end_and_a_fallback_repeats_nothing():
     assert 'fallback: stop with aborted' in machine.of(EventKind.QUERY_EXPIRED)[0].text
 
 
+def test_a_fallback_ends_with_an_outcome_though_a_state_has_its_name():
+    machine = smach.StateMachine(outcomes=['aborted', 'PARK'])
+    with machine:
+        smach.StateMachine.add('POUR', Scripted('aborted'), {'ok': 'PARK', 'preempted': 'PARK'})
+        smach.StateMachine.add('PARK', Scripted(), {'ok': 'aborted', 'preempted': 'aborted'})
+    watched, _ = guarded(machine, max_recoveries=0, on_no_answer='give_up:PARK')
+
+    assert watched.run() == 'PARK'
+    assert watched.visits() == ['POUR']
+    assert 'fallback: end with PARK' in watched.of(EventKind.QUERY_EXPIRED)[0].text
+
+
 def test_a_fallback_may_lead_to_a_place_from_which_nothing_is_repeated():
     machine = smach.StateMachine(outcomes=OUTCOMES)
     with machine:
