@@ -15,7 +15,6 @@ from smach_oracle import __version__
 from smach_oracle.oracle import OracleContainer, Settings
 from smach_oracle.oracle.execution import origin
 from smach_oracle.oracle.execution.origin import (
-    LARGEST_INPUT,
     LONGEST_INPUT,
     MOST_INPUTS,
     inputs_of,
@@ -144,9 +143,9 @@ def test_inputs_are_the_plain_values_of_the_userdata():
 
 def test_inputs_may_be_as_long_and_almost_as_large_as_the_limits():
     userdata = smach.UserData()
-    userdata.long, userdata.large = 'x' * LONGEST_INPUT, LARGEST_INPUT - 1
-    userdata.too_large = LARGEST_INPUT
-    assert inputs_of(userdata) == {'long': 'x' * LONGEST_INPUT, 'large': LARGEST_INPUT - 1}
+    userdata.long, userdata.large = 'x' * LONGEST_INPUT, 2**63 - 1
+    userdata.too_large = 2**63
+    assert inputs_of(userdata) == {'long': 'x' * LONGEST_INPUT, 'large': 2**63 - 1}
 
 
 def test_inputs_are_few_and_those_of_no_userdata_are_none():

@@ -8,7 +8,7 @@ who works in it looks at `reason`.
 import contextlib
 import contextvars
 import threading
-from enum import Enum, IntEnum
+from enum import Enum, IntEnum, unique
 from typing import (
     Callable,
     Iterable,
@@ -27,6 +27,7 @@ from .clock import Bell, Clock, Flag, PausableClock
 LOOK_S = 0.05
 
 
+@unique
 class Reason(IntEnum):
     """A reason to end early. If there are several, the first of this order counts.
 

@@ -12,6 +12,8 @@ import smach
 from smach_oracle.oracle import OperatorHand
 from smach_oracle.store.store_file import StoreFile
 
+PAUSE, RESUME = ('pause',), ('resume',)
+
 
 def build(diary, points):
     """A, B and C; an operator pauses the machine while A runs."""
@@ -49,8 +51,8 @@ def killed_after(killed, *commands):
 
         class Commanded(Noted):
             def execute(self, userdata):
-                for command in commands:
-                    getattr(OperatorHand(machine.machine), command)(by='ann')
+                for command, *what in commands:
+                    getattr(OperatorHand(machine.machine), command)(*what, by='ann')
                 os.kill(os.getpid(), signal.SIGKILL)
 
         Commanded.__name__ = 'Noted'  # the script has not changed
@@ -65,13 +67,13 @@ def killed_after(killed, *commands):
 @pytest.mark.parametrize(
     'commands, is_paused',
     [
-        (['pause'], True),
-        (['pause', 'resume'], False),
-        (['pause', 'resume', 'pause'], True),
+        ([PAUSE], True),
+        ([PAUSE, RESUME], False),
+        ([PAUSE, RESUME, PAUSE], True),
         ([], False),
     ],
 )
-def test_it_is_paused_where_it_goes_on_and_says_so(tmp_path, commands, is_paused):
+def test_it_is_paused_where_it_goes_on_and_says_so(tmp_path, log, commands, is_paused):
     killed = KilledMachine(make(tmp_path / 'killed'), build)
     killed_after(killed, *commands)
 
@@ -82,15 +84,25 @@ def test_it_is_paused_where_it_goes_on_and_says_so(tmp_path, commands, is_paused
                 assert machine.hand.status().paused_by == 'ann'
                 assert not killed.diary.count('begins')
                 machine.hand.resume()
-            return machine.end()
+            return machine.end(), [text for _, text in log if 'is paused' in text]
 
-    assert in_a_process(work) == 'succeeded'
+    said = ['TOP: is paused, as before its program was stopped'] if is_paused else []
+    assert in_a_process(work) == ['succeeded', said]
     assert killed.diary.count('begins') == {'A': 1, 'B': 1, 'C': 1}  # what is killed writes none
+
+
+def test_a_command_of_which_nothing_is_kept_makes_no_moment(tmp_path):
+    moments = []
+    for times in (1, 5):
+        killed = KilledMachine(make(tmp_path / str(times)), build)
+        killed_after(killed, *[('set_breakpoint', 'C'), ('remove_breakpoint', 'C')] * times)
+        moments.append(len(StoreFile(killed.store, read_only=True).moments(1)))
+    assert moments[0] == moments[1]
 
 
 def test_killed_again_and_gone_back_it_is_still_paused(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), build)
-    killed_after(killed, 'pause')
+    killed_after(killed, PAUSE)
     first = StoreFile(killed.store, read_only=True).moments(1)[0].number
 
     def waits(**more):
