@@ -19,6 +19,7 @@ from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.decision.failure_rate import ESTIMATORS, base_of, merged
 from smach_oracle.oracle.machine import container_records
 from smach_oracle.oracle.records import folder_locks as lock_module
+from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.folder_locks import folder_lock
 
 HERE = os.path.dirname(os.path.abspath(__file__))
@@ -46,6 +47,19 @@ def test_two_machines_keep_what_both_have_learned(tmp_path):
     assert (learned(path, 'PLACE'), learned(path, 'PLACE', 'B')) == ((1, 0), (1, 1))
     again = machine(path, 'PICK', [])
     assert (again.rate('A').successes, again.rate('A').failures) == (2, 1)
+
+
+def test_a_machine_that_was_built_under_an_oracle_reads_the_file_as_its_trial_begins(tmp_path):
+    rates = []
+    for _ in range(2):
+        built = OracleContainer(['done', 'aborted'], settings={'rates_file': str(tmp_path / 'r')})
+        with built:
+            built.add('A', Scripted('aborted', outcomes=('ok', 'aborted')), {'ok': 'done'})
+        built.events.observers.append(
+            lambda event: rates.append(event.rate) if event.kind is EventKind.FAILURE else None
+        )
+        assert built.execute() == 'done'
+    assert rates[0] < rates[1], 'the second one knows of the failure of the first one'
 
 
 @pytest.mark.parametrize('settings', [{}, {'estimator': 'exponential'}, {'memory': 3}])
