@@ -2,9 +2,9 @@
 
 From the top down, each package above all that follow it: `prospects`, which lists what the oracle
 may do; `operator_hand`, for operators; `container`, the public face; `execution`, `checkpoint`,
-`branches`, `recovery`, `machine`, `control`, `asking`, `records`, `settings`, `decision`.
+`branches`, `recovery`, `machine`, `control`, `asking`, `records`, `settings`, `decision`, `scope`.
 Pure are `decision`, `settings`, all of `records` except the rates file, the question of `asking`,
-`errors`, `background`, `waiting` and `number_checks`.
+`errors` and `number_checks`.
 
 `OracleContainer` is imported when it is first asked for, so that the pure parts need no smach.
 """

@@ -288,7 +288,7 @@ def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) 
     kind = failure_kind(outcome, route, settings, node.in_force.failing)
     return OutcomeProspect(
         outcome,
-        node.site.in_words(route, outcome),
+        node.site.shown_route(route, outcome),
         kind is not FailureKind.NOT_A_FAILURE,
         kind is not FailureKind.NOT_A_FAILURE
         and node.site.foresees(outcome, route, kind, settings),

@@ -297,7 +297,7 @@ def test_an_item_that_its_author_passes_over_is_passed_over_with_a_word():
     )
     assert machine.run() == 'done' and grasp.runs == 2 and not expert.questions
     assert [event.text for event in machine.of(EventKind.WARNING)] == [
-        'its item is passed over with aborted'
+        'item 1 of 2 is passed over with aborted'
     ]
 
 
@@ -350,5 +350,5 @@ def test_an_item_that_is_passed_over_from_two_levels_below_is_told():
     )
     assert machine.run() == 'done' and not expert.questions
     assert [(event.path, event.text) for event in machine.of(EventKind.WARNING)] == [
-        ('TOP/ALL/EACH/ARM', 'its item is passed over with aborted')
+        ('TOP/ALL/EACH/ARM', 'item 1 of 2 is passed over with aborted')
     ]

@@ -61,9 +61,9 @@ class Branch(smach.Container):
         self._preempt_requested = False
         self._item: Optional[ItemPort] = None
         self._record: Optional[StateRecord] = None
-        self._rest()
+        self._be_idle()
 
-    def _rest(self) -> None:
+    def _be_idle(self) -> None:
         self._is_running = False
         self._set_current_state(None)
         self._preempted_label: Optional[str] = None
@@ -98,7 +98,7 @@ class Branch(smach.Container):
     def end(self) -> None:
         """Note that an execution of the container is over: another thread may have one, too."""
         if not self._is_under_way():
-            self._rest()
+            self._be_idle()
 
     def execute(self, userdata: smach.UserData) -> object:
         """Execute the state, and recover where it fails. Return its outcome."""
@@ -152,12 +152,12 @@ class Branch(smach.Container):
             node.records.history.visits.append(edge.visit)
             record.snapshot = None
             if self._item is None:
-                self._rest()
+                self._be_idle()
             return outcome
         except (SystemExit, KeyboardInterrupt) as err:
             self._oracle.tree.early_end.of_program = err
             self._oracle.records.drop_snapshots()
-            self._rest()
+            self._be_idle()
             raise
         finally:
             if self._under_way_in == number:
@@ -193,7 +193,7 @@ class Branch(smach.Container):
             raise
         finally:
             node.execution.end(None, error)
-            self._rest()
+            self._be_idle()
             self._find_record()
         if raised.__cause__ is not None and str(raised).startswith(COULD_NOT):
             raise raised.__cause__  # as bare: the container says what state it was

@@ -30,6 +30,7 @@ class IteratorWrapper(ContainerWrapper):
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self._is_asked_to_go_on = False
         self.goes_on = False
+        self.is_left = False  # for a place elsewhere, which also departures note
 
     # -- going on
 
@@ -57,17 +58,20 @@ class IteratorWrapper(ContainerWrapper):
         inside = tuple(wrapper.mark() for wrapper in self._iterators_around())
         if items is None or items.given is not items_of(self.container):
             items = TrackedItems(items_of(self.container), self._tell)
-        has_rest = items.has_rest() and (trial_id, inside) == (self._trial_id, self._inside)
-        self.goes_on = items.goes_on = self._is_asked_to_go_on and has_rest
+        has_items_left = items.has_items_left() and (trial_id, inside) == (
+            self._trial_id,
+            self._inside,
+        )
+        self.goes_on = items.goes_on = self._is_asked_to_go_on and has_items_left
         self._is_asked_to_go_on = False
-        if has_rest and self._ended_with is None and not self.goes_on:
+        if has_items_left and self._ended_with is None and not self.goes_on:
             items.tell_of_repeats()
         resumed = self._to_resume()
         items.begins_with = 1 if resumed is None else resumed.item
         # a branch notes by itself that an item begins
         items.begins = None if self.branches else self.begin_item
         if self.goes_on:
-            self._pass_on(items)
+            self._pass_on()
         else:
             self._rounds += 1
         self.tracked, self._trial_id, self._ended_with = items, trial_id, None
@@ -93,12 +97,15 @@ class IteratorWrapper(ContainerWrapper):
             labels = node.labels_from_parent
             node = node.parent
 
-    def _pass_on(self, items: TrackedItems) -> None:
-        """Let an Iterator directly inside go on too: its items belong to the unfinished one."""
+    def _pass_on(self) -> None:
+        """Let an Iterator directly inside go on too, where its items belong to the unfinished one.
+
+        It sees that by the mark of this one.
+        """
         for _, state in self.states():
             inner = wrapper_of(state)
             if isinstance(inner, IteratorWrapper):
-                inner.ask_to_go_on(not items.is_finished)
+                inner.ask_to_go_on(True)
 
     def _tell(self, text: str) -> None:
         self.parent.warn(text, '/'.join(self.labels_from_parent))
@@ -121,8 +128,8 @@ class IteratorWrapper(ContainerWrapper):
     def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
         self._ended_with = outcome if isinstance(outcome, str) and not self.is_left else None
-        if cast('TrackedItems', self.tracked).is_exhausted:
-            # the author has gone on behind it where an oracle has given up
+        if cast('TrackedItems', self.tracked).is_finished:
+            # the author has gone on behind the item where an oracle has given up
             for _, machine in machines_below(self.container):
                 node = node_of(machine)
                 if node is not None:

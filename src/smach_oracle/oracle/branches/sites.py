@@ -73,7 +73,7 @@ class BranchSite(Site):
             if dict(_entries(conditions)).get(self.label) == outcome
         )
 
-    def in_words(self, route: Route, outcome: str) -> Route:
+    def shown_route(self, route: Route, outcome: str) -> Route:
         """Say where an outcome leads, for people."""
         return Route(self._leads_to(outcome), True)
 

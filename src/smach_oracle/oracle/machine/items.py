@@ -16,7 +16,7 @@ class TrackedItems:
     """Stands in for what an Iterator was given, while it executes.
 
     An Iterator asks it for an iterator when it begins, and for one item after the other. With
-    `goes_on` set, where it has a rest, it goes on the next time with the item that was not
+    `goes_on` set, where it has items left, it goes on the next time with the item that was not
     finished. An item is finished once the Iterator asks for the next one. It does not after an
     outcome that breaks, nor once it is preempted. To whoever looks at it otherwise it is what the
     Iterator was given.
@@ -38,7 +38,7 @@ class TrackedItems:
         self._error: Optional[Exception] = None
         self._is_pending: bool  # whether the item under way is handed out once more
 
-    def has_rest(self) -> bool:
+    def has_items_left(self) -> bool:
         """Whether it has begun and items may be left, the unfinished one among them."""
         return bool(self.number) and not self.is_exhausted
 

@@ -130,7 +130,7 @@ class Site:
         recovers = author_recovers(outcome, route, kind, settings)
         return recovers and not goes_unnoticed(self._node, route)
 
-    def in_words(self, route: Route, outcome: str) -> Route:
+    def shown_route(self, route: Route, outcome: str) -> Route:
         """Return where an outcome leads, for people."""
         return route
 

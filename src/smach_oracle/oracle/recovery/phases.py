@@ -16,7 +16,7 @@ from ..decision.policy import Action
 from ..decision.sentence import DecisionFacts, cause_of
 from ..errors import TrialError
 from ..machine.health_watch import FAILED
-from ..machine.nesting import settle_ways
+from ..machine.nesting import items_under_way, settle_ways
 from ..machine.places import (
     JumpPath,
     TreePlace,
@@ -217,7 +217,8 @@ def _left_to_others(recovery: Recovery, way: Optional[JumpPath] = None) -> Optio
 def _give_way(recovery: Recovery, why: Foreseen) -> Verdict:
     """End the container, and leave all else to who is above it."""
     if why.item_outcome:
-        recovery.warn('its item is passed over with {}'.format(why.item_outcome))
+        item = items_under_way(recovery.node) or 'its item'
+        recovery.warn('{} is passed over with {}'.format(item, why.item_outcome))
     return recovery.give_up('{}: {}'.format(recovery.cause, why.text))
 
 
