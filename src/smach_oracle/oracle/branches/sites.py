@@ -7,14 +7,12 @@ import smach
 
 from ..asking.question import OutcomeChoice
 from ..identity import attribute_of
-from ..machine.site import Route, Site, judged_at
+from ..machine.site import Route, Site, judged_at, leads_to_next_item
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import (
-    break_outcomes_of,
     final_outcomes_of,
-    loop_outcomes_of,
     outcome_map_of,
     states_of,
 )
@@ -110,13 +108,13 @@ class IteratorSite(BranchSite):
 
     def _is_drawn(self, outcome: str) -> bool:
         """Whether it leads to the next item, or is mapped to what is no failure."""
-        if loops(self.container, outcome):
+        if leads_to_next_item(self.container, outcome):
             return True
         mapped = final_outcomes_of(self.container)
         return outcome in mapped and not is_failure_above(self._node, mapped[outcome])
 
     def _leads_to(self, outcome: str) -> str:
-        if loops(self.container, outcome):
+        if leads_to_next_item(self.container, outcome):
             return NEXT_ITEM
         return 'the end of the iteration, with {}'.format(
             final_outcomes_of(self.container).get(outcome, outcome)
@@ -126,15 +124,9 @@ class IteratorSite(BranchSite):
         """Say which item is passed over where this failing outcome leads to the next one."""
         wrapper = wrapper_of(self.container)
         item = wrapper.in_words() if wrapper is not None else ''
-        if item and loops(self.container, outcome):
+        if item and leads_to_next_item(self.container, outcome):
             text = '{} is passed over with {}, as its author has drawn it'
             self._node.warn(text.format(item, outcome), label)
-
-
-def loops(iterator: smach.Container, outcome: str) -> bool:
-    """Whether an outcome of its state leads an Iterator to the next item."""
-    looping, breaking = loop_outcomes_of(iterator), break_outcomes_of(iterator)
-    return outcome not in breaking and (not looping or outcome in looping)
 
 
 def is_failure_above(node: TreeNode, outcome: str) -> bool:

@@ -8,7 +8,7 @@ from ..asking.question import OutcomeChoice
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.failing_outcomes import FailingNames
 from ..settings.settings import Settings, StateSettings
-from ..smach_private import states_of, transitions_of
+from ..smach_private import break_outcomes_of, loop_outcomes_of, states_of, transitions_of
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode
@@ -72,6 +72,14 @@ def author_recovers(outcome: str, route: Route, kind: FailureKind, settings: Sta
     if settings.author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
         return False
     return route.is_state or outcome not in settings.failure_outcomes
+
+
+def leads_to_next_item(container: smach.Container, outcome: str) -> bool:
+    """Whether a container is an Iterator that goes on behind this outcome of its state."""
+    if not isinstance(container, smach.Iterator):
+        return False
+    looping, breaking = loop_outcomes_of(container), break_outcomes_of(container)
+    return outcome not in breaking and (not looping or outcome in looping)
 
 
 def goes_unnoticed(node: 'TreeNode', route: Route) -> bool:

@@ -18,14 +18,13 @@ from ..machine.places import (
     levels_above,
     links_to,
 )
-from ..machine.site import author_recovers, goes_unnoticed, judged_at
+from ..machine.site import author_recovers, goes_unnoticed, judged_at, leads_to_next_item
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind, FailureKind
 from ..records.facts import DECIDED_BY, Decider
 from ..smach_private import (
     current_label_of,
     is_executing,
-    loop_outcomes_of,
     states_of,
 )
 from .deciding import decide_on_level
@@ -44,8 +43,7 @@ def _is_item_passed_over(node: TreeNode, above: TreeNode, outcome: str) -> bool:
     settings = above.in_force.of_state('/'.join(filter(None, (path, *labels[:-1]))), labels[-1])
     # what only the settings call a failure its author has not foreseen
     return (
-        isinstance(around, smach.Iterator)
-        and outcome in loop_outcomes_of(around)
+        leads_to_next_item(around, outcome)
         and settings.author_recoveries != 'override'
         and outcome in node.in_force.failing
     )
