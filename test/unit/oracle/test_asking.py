@@ -414,6 +414,17 @@ def test_a_preempt_takes_the_question_back():
     assert machine.run() == 'done', 'the next run is not preempted'
 
 
+def test_an_answer_that_comes_after_a_preempt_is_none():
+    def too_late(question, cancelled, progress):
+        machine.machine.request_preempt()
+        return goto('B') if cancelled.wait(20) else None
+
+    machine, _ = asking(too_late)
+    assert machine.run() == 'preempted'
+    assert machine.visits() == ['A', 'B']
+    assert machine.of(EventKind.QUERY_CANCELLED) and not machine.of(EventKind.QUERY_ANSWERED)
+
+
 def test_a_shutdown_takes_the_question_back(monkeypatch):
     machine, _ = asking(waits, deadline_s=0)
     asked = threading.Event()

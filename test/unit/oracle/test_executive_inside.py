@@ -7,6 +7,7 @@ from held_machines import Gate, Held
 from machines import (
     FakeExpert,
     FakeHealth,
+    FakeWaiting,
     Scripted,
     Watched,
     chain_of,
@@ -19,7 +20,7 @@ from occasions import GUARDED, OCCASIONS, SOON, Hangs, Options, chain
 from waiting import wait_for
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.machine.nesting import nodes_of
 from smach_oracle.oracle.machine.tree_node import node_of
 from smach_oracle.oracle.records.events import EventKind
@@ -273,6 +274,44 @@ def test_a_recovery_that_a_preempt_ends_spends_no_recovery_of_the_trial(policy):
     assert machine[0].of(EventKind.PRECONDITION_END), 'it has come in the midst of the decision'
     made = len(machine[0].of(EventKind.JUMP))
     assert machine[0].machine._oracle.tree.spent()['budget'][0] == made
+
+
+@pytest.mark.parametrize(
+    'policy, begins',
+    [
+        ({'name': 'ladder', 'wait_s': 3600}, EventKind.DECISION),
+        ('prose', EventKind.HEALTH_WAIT_START),  # it has decided, and then the robot is not well
+    ],
+)
+def test_a_recovery_that_a_preempt_ends_as_it_waits_is_not_counted(policy, begins):
+    decided = []
+
+    def observe(event):
+        if event.kind is EventKind.DECISION:
+            decided.append(event)
+        if event.kind is begins:
+            machine.machine.request_preempt()
+
+    machine = watched(
+        Scripted('aborted', 'aborted'),
+        settings={'policy': policy},
+        health=lambda: not decided or policy != 'prose',
+    )
+    machine.machine.events.observers.append(observe)
+    assert machine.run() == 'preempted' and decided and not machine.of(EventKind.JUMP)
+    assert machine.rate('A').recoveries == 0
+    assert machine.machine._oracle.tree.spent()['budget'][0] == 0
+
+
+def test_what_a_level_above_decides_waits_as_its_policy_says():
+    work = OracleContainer.wrap(
+        chain(A=Scripted('aborted')), settings={'policy': 'always_ask', 'escalate': True}
+    )
+    machine = Watched(chain(WORK=work), settings={'policy': {'name': 'ladder', 'wait_s': 5}})
+    waiting = oracle_of(machine.machine).waiting = FakeWaiting()
+    assert machine.run() == 'done'
+    assert waiting.waited == [(5.0, 'waiting')]
+    assert machine.rate('A').recoveries == machine.rate('WORK').recoveries == 1
 
 
 def test_no_level_above_has_failed_where_a_preempt_ends_the_recovery():

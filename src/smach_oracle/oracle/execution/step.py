@@ -399,6 +399,7 @@ class Step:
                 verdict = self._in_time(occasion, meta.take_verdict())
             finally:
                 lock.acquire()
+            recovery.settle(verdict)
             return Applying(recovery, meta).apply(verdict)
         except BaseException:
             be_back(node, self._record.label)

@@ -32,7 +32,7 @@ class TrialBudget:
         """Begin a trial: nothing is spent, and its minutes begin now."""
         with self._lock:
             self._limits = limits
-            self._recoveries = self._questions = 0
+            self._recoveries = self._set_aside = self._questions = 0
             self.time.begin()
             self.work_time.begin()
 
@@ -58,7 +58,7 @@ class TrialBudget:
 
     @property
     def recoveries(self) -> int:
-        """The recoveries that are spent."""
+        """The recoveries that are spent or set aside."""
         return self._recoveries
 
     @property
@@ -70,7 +70,7 @@ class TrialBudget:
         """Return the recoveries, the questions, the seconds spent, and those of work."""
         with self._lock:
             return [
-                self._recoveries,
+                self._recoveries - self._set_aside,
                 self._questions,
                 self.time.now(),
                 self.work_time.now(),
@@ -115,13 +115,23 @@ class TrialBudget:
         return _spent(self._limits.recoveries, self._recoveries, 'recovery', 'recoveries')
 
     def take_recovery(self, most: Optional[int] = None) -> str:
-        """Spend one recovery, or say that all are spent, or `most`, of which a policy makes do."""
+        """Set one recovery aside, or say that all are spent, or `most`, of which a policy makes do.
+
+        `settle_recovery` is to follow.
+        """
         with self._lock:
             why_not = self.why_no_recovery()
             if most is not None and self._recoveries >= most:
                 why_not = why_not or "the trial's {} attempts are spent".format(most)
             self._recoveries += not why_not
+            self._set_aside += not why_not
             return why_not
+
+    def settle_recovery(self, is_made: bool) -> None:
+        """Spend the recovery that was set aside, or have it back, as it was not made."""
+        with self._lock:
+            self._set_aside -= 1
+            self._recoveries -= not is_made
 
     def why_no_question(self) -> str:
         """Say that the questions are spent."""

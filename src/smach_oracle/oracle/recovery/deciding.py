@@ -101,7 +101,7 @@ def _choose(recovery: Recovery, situation: Situation, why_not_above: WhyNotAbove
     if chosen is None:
         why = policy.why(cast('Situation', recovery.situation))
         return Decider.POLICY, recovery.facts(Action.ASK, blocked=why)
-    spent = _take_recovery(recovery, policy.most_of_trial)
+    spent = recovery.take_recovery(policy.most_of_trial)
     if spent:  # by others meanwhile
         recovery.choice = None
         decider = Decider.BUDGET if budget.why_no_recovery() else Decider.POLICY
@@ -194,15 +194,8 @@ def _what_prevents(recovery: Recovery, way: JumpPath) -> Tuple[Decider, str]:
     reason = why_closed(recovery, option) or function_that_runs(recovery)
     if reason:
         return Decider.POLICY, reason
-    spent = _take_recovery(recovery)
+    spent = recovery.take_recovery()
     return (Decider.BUDGET, spent) if spent else (Decider.POLICY, '')
-
-
-def _take_recovery(recovery: Recovery, most: Optional[int] = None) -> str:
-    """Spend a recovery of the trial, or say why not. A recovery that is over spends none."""
-    if recovery.is_over():
-        return 'the recovery was ended early'
-    return recovery.budget.take_recovery(most)
 
 
 # -- preconditions

@@ -7,7 +7,7 @@ from ..machine.places import JumpPath, jump_path_to, place_named
 from ..settings.settings import GROUPS
 from .options import option_on, why_repeats
 from .recovery import Recovery
-from .verdict import Verdict
+from .verdict import JumpTo, Verdict
 
 
 def fall_back(recovery: Recovery) -> Verdict:
@@ -18,10 +18,11 @@ def fall_back(recovery: Recovery) -> Verdict:
     verb, target = node.settings.on_no_answer
     if verb == 'goto':
         way = _jump_path_back(recovery)
-        problem = _why_not(recovery, way) or recovery.budget.take_recovery()
+        problem = _why_not(recovery, way) or recovery.take_recovery()
         if not problem:
-            recovery.record.fallbacks += 1
-            return recovery.jump(cast('JumpPath', way), why)
+            verdict = recovery.jump(cast('JumpPath', way), why)
+            recovery.record.fallbacks += isinstance(verdict, JumpTo)
+            return verdict
         _warn(recovery, 'cannot go to {!r}: {}; stopping'.format(target, problem))
     elif verb == 'give_up':
         if target in node.machine.get_registered_outcomes():

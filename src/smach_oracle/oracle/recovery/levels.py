@@ -199,7 +199,7 @@ def _decide_above(
     level.records.note_failure(record)
     tell_failure(level, record, failure, continuous, reading)
     sentence = tell_decision(above, decided)
-    record.recoveries += 1
+    recovery.recovered.append(record)
     kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
     jump = JumpTo(way, '', sentence, kept, level, restarts, above.chosen)
     return jump, facts.wait_s

@@ -139,20 +139,20 @@ def decide(recovery: Recovery) -> Optional[Verdict]:
     _, facts = decided
     recovery.cause = cause_of(facts)
     if facts.action is Action.ASK:
-        recovery.decided = decided
+        recovery.decided_to_ask = decided
         return None
     tell_decision(recovery, decided)
-    return _follow_policy(recovery, facts)
+    return _carry_out(recovery, facts)
 
 
-def _follow_policy(recovery: Recovery, facts: DecisionFacts) -> Verdict:
+def _carry_out(recovery: Recovery, facts: DecisionFacts) -> Verdict:
     """Carry out a decision that asks nobody."""
     way = recovery.jump_path
     if way is None:
         return _give_way(
             recovery, _why_nobody_is_asked(recovery) or Foreseen('the policy asks nobody')
         )
-    recovery.record.recoveries += 1
+    recovery.recovered.append(recovery.record)
     restarts = facts.action is Action.RESTART
     written: FrozenSet[str] = frozenset() if restarts else way.kept(recovery.watch)
     jump = JumpTo(way, written=written, restarts=restarts, chosen=recovery.chosen)
@@ -170,9 +170,9 @@ def _wait_and_jump(recovery: Recovery, wait_s: float, jump: JumpTo) -> Verdict:
 
 def escalate(recovery: Recovery) -> Optional[Verdict]:
     """Have the levels above decide before a person is asked, or end where it is left to them."""
-    if recovery.decided is None:
+    if recovery.decided_to_ask is None:
         return None
-    decider, facts = recovery.decided
+    decider, facts = recovery.decided_to_ask
     nobody = _why_nobody_is_asked(recovery)
     levels = [] if nobody else levels_that_may_decide(recovery, decider)
     asked = (
@@ -187,7 +187,7 @@ def escalate(recovery: Recovery) -> Optional[Verdict]:
     if recovery.is_over():
         return recovery.end_early()
     if outer is not None:
-        recovery.record.recoveries += 1
+        recovery.recovered.append(recovery.record)
         jump, wait_s = outer
         return _wait_and_jump(recovery, wait_s, jump)
     return _give_way(recovery, nobody) if nobody else None

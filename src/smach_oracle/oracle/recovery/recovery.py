@@ -54,18 +54,20 @@ class Recovery:
     A preempt or a shutdown cancels its `scope`, and so does the end of what goes on around it. The
     phases run in the machine's thread. `cancel` may be called from any thread.
 
+    `recovered`: the states whose recovery it is, if it comes to a jump.
     `met`, `not_met`: names of preconditions. `reading`: the rate as the policy was asked.
     `jump_path`: where it has decided to go. `situation`, `choice`: that of a policy that goes
-    by ways, and the ways as it would go them, the first one now. `decided`: to ask. `cause`: of the
-    decision.
+    by ways, and the ways as it would go them, the first one now. `decided_to_ask`: why. `cause`: of
+    the decision.
     `begin_question`: is called before each question. `takes`: whether an answer comes in time, once
     it is here.
     """
 
     asks_at_once = False  # no policy has a say
     cause = ''
-    decided: Optional[Decided] = None
+    decided_to_ask: Optional[Decided] = None
     ends_budget = False  # whether the question's deadline is that of the trial
+    has_set_aside = False  # one recovery of the budget
     not_met = ''
     question_cancelled: Optional[threading.Event] = None  # also at a shutdown, or a late deadline
     question_id = ''  # of the last question
@@ -94,11 +96,12 @@ class Recovery:
         self.budget = node.tree.budget
         self.tried: List[str] = []
         self.met: List[str] = []
+        self.recovered: List[StateRecord] = []
         # who still runs writes meanwhile, and nothing of that is the recovery's
         keys = () if self.failure.still_runs else node.in_force.deep_copy_keys
         self.watch = WriteWatch(node.machine, keys)
         self.lock = threading.Lock()
-        self.takes: Callable[[Answer], bool] = lambda answer: True
+        self.takes: Callable[[Answer], bool] = lambda answer: not self.stopped()
         self.begin_question: Callable[['Recovery'], None] = lambda recovery: None
 
     @property
@@ -123,6 +126,23 @@ class Recovery:
     def is_over(self) -> bool:
         """Whether it is stopped, or the trial's time is over."""
         return self.scope.reason is not None or bool(self.budget.why_over())
+
+    def take_recovery(self, most: Optional[int] = None) -> str:
+        """Set a recovery of the budget aside, once, or say why not. See TrialBudget."""
+        origin = self.origin
+        if self.is_over():
+            return 'the recovery was ended early'
+        why_not = '' if origin.has_set_aside else self.budget.take_recovery(most)
+        origin.has_set_aside = not why_not
+        return why_not
+
+    def settle(self, verdict: Verdict) -> None:
+        """Count what it has spent if the machine jumps. Else the budget has it back."""
+        jumps = isinstance(verdict, JumpTo)
+        for record in self.recovered if jumps else ():
+            record.recoveries += 1
+        if self.has_set_aside:
+            self.budget.settle_recovery(jumps)
 
     def why_taken_back(self) -> str:
         """Return why its question is taken back, as the events say it."""

@@ -1,10 +1,16 @@
 """Killed as the oracle checks and achieves preconditions and tries again, a machine goes on."""
 
+import os
+import signal
+
 import pytest
-from killed_machines import Noted, around
+from killed_machines import Diary, KilledMachine, Noted, Points, around, in_a_process
+from killed_trees import make
 from left_stores import Left
+from machines import FakeWaiting, Watched
 
 import smach
+from smach_oracle.oracle import oracle_of
 
 ENDS = {'succeeded': 'succeeded', 'aborted': 'aborted'}
 
@@ -98,3 +104,26 @@ def test_a_branch_that_is_tried_again_has_not_ended_wherever_it_is_killed(tmp_pa
         assert told.get('outcome') == 'succeeded', (point, told)
         assert not [text for text in told['log'] if 'is not there any more' in text], point
         assert killed.diary.count('ends')['LEFT'] >= 2, point
+
+
+def test_a_recovery_counts_once_where_it_was_killed_before_its_jump(tmp_path):
+    def build(diary, points):
+        return around('PICK', OnceFailing('PICK', diary, points), ENDS)
+
+    killed = KilledMachine(make(tmp_path / 'killed'), build)
+
+    def run(as_it_waits):
+        settings = {
+            'policy': {'name': 'ladder', 'wait_s': 5},
+            'checkpoint': killed.store,
+            'on_resume': 'recover',
+        }
+        machine = Watched(
+            build(Diary(killed.diary._path), Points(0)), name='TOP', settings=settings
+        )
+        oracle_of(machine.machine).waiting = FakeWaiting(as_it_waits)
+        outcome, spent = machine.run(), machine.machine._oracle.tree.spent()['budget'][0]
+        return outcome, spent, machine.rate('PICK').recoveries
+
+    assert in_a_process(lambda: run(lambda: os.kill(os.getpid(), signal.SIGKILL))) is None
+    assert in_a_process(lambda: run(lambda: None)) == ['succeeded', 1, 1]
