@@ -109,7 +109,8 @@ class StateMachine(Container):
         self._states[label] = state
         self._transitions[label] = transitions
         self._remappings[label] = {} if remapping is None else remapping
-        self._constants[label] = {} if constants is None else constants
+        if constants is not None:  # most have none, and each step asks whether there are any
+            self._constants[label] = constants
         if self._connector_outcomes and self._last_added_label is not None:
             for outcome in self._connector_outcomes:
                 self._transitions[self._last_added_label][outcome] = label
@@ -256,9 +257,8 @@ class StateMachine(Container):
         lock = self._state_transitioning_lock
         lock.release()
         try:
-            constants = self._constants.get(label)
-            if constants:
-                for key, value in constants.items():
+            if self._constants and label in self._constants:
+                for key, value in self._constants[label].items():
                     self.userdata[key] = value
             outcome = state.execute(visit.remapper)
         except smach.InvalidUserCodeError:

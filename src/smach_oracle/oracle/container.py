@@ -353,7 +353,7 @@ class OracleContainer(smach.StateMachine):
         engine, records, history = node.engine, node.records, node.records.history
         abandoned = node.tree.workers.abandoned
         states, transitions_of, remappings = self._states, self._transitions, self._remappings
-        constants_of = self._constants.get
+        constants_of = self._constants
         # a machine that runs has a current state, with its label and its transitions
         label: str = self._current_label  # type: ignore[assignment]
         state: smach.State = self._current_state  # type: ignore[assignment]
@@ -378,7 +378,7 @@ class OracleContainer(smach.StateMachine):
                 view = record.view = StateView(self, label, state)
             record.snapshot = data_of(userdata).copy()
             observed = node.events.observers
-            constants = constants_of(label)
+            constants = constants_of.get(label) if constants_of else None
             outcome: Any  # a user's state may return anything
             error = None
             if engine.lock_is_held:
