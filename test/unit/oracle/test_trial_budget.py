@@ -412,3 +412,24 @@ def test_where_the_trial_and_the_policy_make_do_with_as_much_the_budget_is_named
     budget.begin(Budget(recoveries=1))
     assert not budget.take_recovery(1)
     assert budget.take_recovery(1) == "the trial's 1 recovery is spent"
+
+
+def test_a_recovery_that_is_set_aside_is_nobody_elses_and_stored_once_it_is_made():
+    budget = TrialBudget(FakeClock())
+    budget.begin(Budget(recoveries=2))
+    assert [bool(budget.take_recovery()) for _ in range(3)] == [False, False, True]
+    assert budget.spent()[0] == 0
+    budget.settle_recovery(True)
+    budget.settle_recovery(False)
+    assert budget.spent()[0] == budget.recoveries == 1
+    assert not budget.take_recovery()
+
+
+def test_a_recovery_of_an_earlier_trial_takes_nothing_from_this_one():
+    budget = TrialBudget(FakeClock())
+    budget.begin(Budget(recoveries=1))
+    assert not budget.take_recovery()
+    budget.begin(Budget(recoveries=1))
+    budget.settle_recovery(False)
+    assert budget.spent()[0] == budget.recoveries == 0
+    assert not budget.take_recovery() and budget.take_recovery()

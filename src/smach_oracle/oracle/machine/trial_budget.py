@@ -130,8 +130,9 @@ class TrialBudget:
     def settle_recovery(self, is_made: bool) -> None:
         """Spend the recovery that was set aside, or have it back, as it was not made."""
         with self._lock:
-            self._set_aside -= 1
-            self._recoveries -= not is_made
+            if self._set_aside:  # else a machine that was left behind is of an earlier trial
+                self._set_aside -= 1
+                self._recoveries -= not is_made
 
     def why_no_question(self) -> str:
         """Say that the questions are spent."""

@@ -186,7 +186,7 @@ def _place_of(recovery: Recovery, action: Action) -> Tuple[str, Optional[TreePla
 
 
 def _what_prevents(recovery: Recovery, way: JumpPath) -> Tuple[Decider, str]:
-    """Spend a recovery on going to a place, or return what prevents it, and why."""
+    """Set a recovery aside for going to a place, or return what prevents it, and why."""
     option = option_on(recovery, way)
     reason = why_repeats(recovery, option)
     if reason:
