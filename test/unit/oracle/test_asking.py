@@ -425,6 +425,29 @@ def test_an_answer_that_comes_after_a_preempt_is_none():
     assert machine.of(EventKind.QUERY_CANCELLED) and not machine.of(EventKind.QUERY_ANSWERED)
 
 
+def test_an_interface_that_is_chosen_after_a_preempt_is_not_started():
+    started = []
+
+    def too_late(question, cancelled, progress):
+        machine.machine.request_preempt()
+        return interface('hand') if cancelled.wait(20) else None
+
+    machine = offered_hand(FakeExpert(too_late, interface=lambda *args: started.append(args)))
+    assert machine.run() == 'preempted'
+    assert not started and not machine.of(EventKind.QUERY_ANSWERED, EventKind.INTERFACE_START)
+
+
+def test_a_preempt_as_the_question_expires_comes_before_what_is_done_then():
+    machine, _ = asking(on_no_answer='goto:C')
+    machine.machine.events.observers.append(
+        lambda event: (
+            machine.machine.request_preempt() if event.kind is EventKind.QUERY_EXPIRED else None
+        )
+    )
+    assert machine.run() == 'preempted'
+    assert machine.visits() == ['A', 'B'] and not machine.of(EventKind.GIVE_UP, EventKind.WARNING)
+
+
 def test_a_shutdown_takes_the_question_back(monkeypatch):
     machine, _ = asking(waits, deadline_s=0)
     asked = threading.Event()

@@ -303,6 +303,17 @@ def test_a_recovery_that_a_preempt_ends_as_it_waits_is_not_counted(policy, begin
     assert machine.machine._oracle.tree.spent()['budget'][0] == 0
 
 
+def test_a_recovery_that_raises_spends_nothing(monkeypatch):
+    def fails(recovery, decided):
+        raise OSError('no log')
+
+    machine = watched(Scripted('aborted'))
+    monkeypatch.setattr('smach_oracle.oracle.recovery.phases.tell_decision', fails)
+    with pytest.raises(OSError, match='no log'):
+        machine.run()
+    assert machine.rate('A').recoveries == machine.machine._oracle.tree.budget.recoveries == 0
+
+
 def test_what_a_level_above_decides_waits_as_its_policy_says():
     work = OracleContainer.wrap(
         chain(A=Scripted('aborted')), settings={'policy': 'always_ask', 'escalate': True}

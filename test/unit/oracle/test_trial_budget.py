@@ -379,7 +379,7 @@ def test_a_menu_a_way_and_a_streak_have_the_minutes_of_the_clock_of_work():
 def test_of_several_threads_none_takes_more_than_a_policy_makes_do_with():
     budget = TrialBudget(Clock())
     budget.begin(Budget())
-    assert [budget.take_recovery(2) for _ in range(3)] == [
+    assert [budget.take_recovery(object(), 2) for _ in range(3)] == [
         '',
         '',
         "the trial's 2 attempts are spent",
@@ -410,26 +410,27 @@ def test_a_store_of_an_earlier_version_has_no_time_of_work():
 def test_where_the_trial_and_the_policy_make_do_with_as_much_the_budget_is_named():
     budget = TrialBudget(FakeClock())
     budget.begin(Budget(recoveries=1))
-    assert not budget.take_recovery(1)
-    assert budget.take_recovery(1) == "the trial's 1 recovery is spent"
+    assert not budget.take_recovery('A', 1)
+    assert budget.take_recovery('B', 1) == "the trial's 1 recovery is spent"
 
 
 def test_a_recovery_that_is_set_aside_is_nobody_elses_and_stored_once_it_is_made():
-    budget = TrialBudget(FakeClock())
+    budget, one, two, three = TrialBudget(FakeClock()), object(), object(), object()
     budget.begin(Budget(recoveries=2))
-    assert [bool(budget.take_recovery()) for _ in range(3)] == [False, False, True]
-    assert budget.spent()[0] == 0
-    budget.settle_recovery(True)
-    budget.settle_recovery(False)
+    assert [budget.take_recovery(taker) for taker in (one, one, two)] == [''] * 3
+    assert budget.take_recovery(three) and budget.spent()[0] == 0
+    budget.settle_recovery(one, True)
+    budget.settle_recovery(two, False)
     assert budget.spent()[0] == budget.recoveries == 1
-    assert not budget.take_recovery()
+    assert not budget.take_recovery(three)
 
 
 def test_a_recovery_of_an_earlier_trial_takes_nothing_from_this_one():
-    budget = TrialBudget(FakeClock())
-    budget.begin(Budget(recoveries=1))
-    assert not budget.take_recovery()
-    budget.begin(Budget(recoveries=1))
-    budget.settle_recovery(False)
-    assert budget.spent()[0] == budget.recoveries == 0
-    assert not budget.take_recovery() and budget.take_recovery()
+    budget, earlier, now = TrialBudget(FakeClock()), object(), object()
+    for taker in (earlier, now):
+        budget.begin(Budget(recoveries=1))
+        assert not budget.take_recovery(taker)
+    budget.settle_recovery(earlier, False)
+    assert budget.take_recovery(object()), 'the only one is set aside'
+    budget.settle_recovery(now, True)
+    assert budget.spent()[0] == budget.recoveries == 1

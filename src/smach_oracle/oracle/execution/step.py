@@ -393,13 +393,14 @@ class Step:
             meta.begin(recovery)
             if has_preempt_flag(machine):
                 meta.request_preempt()  # it came from a callback on the way here
+            verdict: Optional[Verdict] = None
             lock.release()
             try:
                 meta.execute(machine.userdata)
                 verdict = self._in_time(occasion, meta.take_verdict())
             finally:
                 lock.acquire()
-            recovery.settle(verdict)
+                recovery.settle(verdict)
             return Applying(recovery, meta).apply(verdict)
         except BaseException:
             be_back(node, self._record.label)

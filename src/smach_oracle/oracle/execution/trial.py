@@ -193,7 +193,7 @@ def _leave_to_parent() -> None:
         for node in nodes_of(top.machine):
             node.join(tree)
             for record in list(node.records.by_label.values()):
-                record.renew_lock()
+                record.begin_in_child()
     GOALS.__dict__.update(RunningGoals().__dict__)
 
 

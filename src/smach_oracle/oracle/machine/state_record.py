@@ -103,7 +103,7 @@ class StateRecord:
         self._visits = 0  # not counted by an FastEdge
         self._visits_before = 0  # visits of earlier trials
         self._estimator = make_estimator(settings.estimator, settings.memory, settings.prior)
-        self.renew_lock()  # rates are read from other threads
+        self._lock = threading.RLock()  # rates are read from other threads
         self.configure(settings, special)
 
     def configure(self, settings: StateSettings, special: bool) -> None:
@@ -336,11 +336,12 @@ class StateRecord:
 
     def __setstate__(self, state: Dict[str, object]) -> None:
         self.__dict__.update(state)
-        self.renew_lock()
-
-    def renew_lock(self) -> None:
-        """Have a lock that nobody holds: in a forked child, no thread lets go of that of before."""
         self._lock = threading.RLock()
+
+    def begin_in_child(self) -> None:
+        """Let nothing be under way in a forked child, where no thread lets go of the lock."""
+        self._lock = threading.RLock()
+        self.__setstate__(self.__getstate__())
 
     def retire_edges(self) -> None:
         """Forget all edges: the next visit takes no short way. Their counts stay."""

@@ -32,7 +32,8 @@ class TrialBudget:
         """Begin a trial: nothing is spent, and its minutes begin now."""
         with self._lock:
             self._limits = limits
-            self._recoveries = self._set_aside = self._questions = 0
+            self._recoveries = self._questions = 0
+            self._takers: List[object] = []  # each has one recovery set aside
             self.time.begin()
             self.work_time.begin()
 
@@ -70,7 +71,7 @@ class TrialBudget:
         """Return the recoveries, the questions, the seconds spent, and those of work."""
         with self._lock:
             return [
-                self._recoveries - self._set_aside,
+                self._recoveries - len(self._takers),
                 self._questions,
                 self.time.now(),
                 self.work_time.now(),
@@ -114,25 +115,34 @@ class TrialBudget:
         """Say that the recoveries are spent."""
         return _spent(self._limits.recoveries, self._recoveries, 'recovery', 'recoveries')
 
-    def take_recovery(self, most: Optional[int] = None) -> str:
-        """Set one recovery aside, or say that all are spent, or `most`, of which a policy makes do.
+    def take_recovery(self, taker: object, most: Optional[int] = None) -> str:
+        """Set a recovery aside, one for each taker, or say that all are spent.
 
-        `settle_recovery` is to follow.
+        :param most: of which a policy makes do.
         """
         with self._lock:
+            if self._has_set_aside(taker):
+                return ''
             why_not = self.why_no_recovery()
             if most is not None and self._recoveries >= most:
                 why_not = why_not or "the trial's {} attempts are spent".format(most)
-            self._recoveries += not why_not
-            self._set_aside += not why_not
+            if not why_not:
+                self._recoveries += 1
+                self._takers.append(taker)
             return why_not
 
-    def settle_recovery(self, is_made: bool) -> None:
-        """Spend the recovery that was set aside, or have it back, as it was not made."""
+    def settle_recovery(self, taker: object, is_made: bool) -> None:
+        """Spend what is set aside for a taker, or have it back, as it was not made.
+
+        One that was left behind may be of an earlier trial. Nothing is set aside for it.
+        """
         with self._lock:
-            if self._set_aside:  # else a machine that was left behind is of an earlier trial
-                self._set_aside -= 1
+            if self._has_set_aside(taker):
+                self._takers = [each for each in self._takers if each is not taker]
                 self._recoveries -= not is_made
+
+    def _has_set_aside(self, taker: object) -> bool:
+        return any(each is taker for each in self._takers)
 
     def why_no_question(self) -> str:
         """Say that the questions are spent."""

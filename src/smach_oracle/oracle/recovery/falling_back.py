@@ -13,6 +13,8 @@ from .verdict import JumpTo, Verdict
 def fall_back(recovery: Recovery) -> Verdict:
     """Do what is configured for a question that nobody answers."""
     why, node = recovery.why_no_answer, recovery.node
+    if recovery.stopped():
+        return recovery.preempted()
     if recovery.occasion.keeps:  # whatever is configured for other questions
         return recovery.keep(why)
     verb, target = node.settings.on_no_answer

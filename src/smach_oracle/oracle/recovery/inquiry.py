@@ -89,7 +89,8 @@ class Inquiry:
                 raise _NoAnswer('no answer by the deadline')
             answer = addressed(checked_type(given), choices_of(question))
             self._check(answer, question)
-            if recovery.takes(answer):
+            is_taken = recovery.takes(answer)
+            if is_taken:
                 self._tell(
                     EventKind.QUERY_ANSWERED,
                     outcome=answer.kind.name.lower(),
@@ -97,7 +98,7 @@ class Inquiry:
                     by=answer.by,
                     text=answer.why,
                 )
-            if answer.kind is AnswerKind.INTERFACE:
+            if is_taken and answer.kind is AnswerKind.INTERFACE:
                 return self._try_interface(answer, question)
             return answer
         except AnswerError as err:

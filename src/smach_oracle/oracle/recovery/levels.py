@@ -194,6 +194,7 @@ def _decide_above(
         return None
     if above.jump_path is None or way is None:
         record.take_back_failure()
+        recovery.settle(None)
         recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
         return None
     level.records.note_failure(record)

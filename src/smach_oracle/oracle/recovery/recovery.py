@@ -67,7 +67,6 @@ class Recovery:
     cause = ''
     decided_to_ask: Optional[Decided] = None
     ends_budget = False  # whether the question's deadline is that of the trial
-    has_set_aside = False  # one recovery of the budget
     not_met = ''
     question_cancelled: Optional[threading.Event] = None  # also at a shutdown, or a late deadline
     question_id = ''  # of the last question
@@ -129,20 +128,16 @@ class Recovery:
 
     def take_recovery(self, most: Optional[int] = None) -> str:
         """Set a recovery of the budget aside, once, or say why not. See TrialBudget."""
-        origin = self.origin
         if self.is_over():
             return 'the recovery was ended early'
-        why_not = '' if origin.has_set_aside else self.budget.take_recovery(most)
-        origin.has_set_aside = not why_not
-        return why_not
+        return self.budget.take_recovery(self.origin, most)
 
-    def settle(self, verdict: Verdict) -> None:
-        """Count what it has spent if the machine jumps. Else the budget has it back."""
+    def settle(self, verdict: Optional[Verdict]) -> None:
+        """Count what was set aside if the machine jumps. Else the budget has it back."""
         jumps = isinstance(verdict, JumpTo)
         for record in self.recovered if jumps else ():
             record.recoveries += 1
-        if self.has_set_aside:
-            self.budget.settle_recovery(jumps)
+        self.budget.settle_recovery(self, jumps)
 
     def why_taken_back(self) -> str:
         """Return why its question is taken back, as the events say it."""
