@@ -30,7 +30,7 @@ class IteratorWrapper(ContainerWrapper):
         self._ended_with: Optional[str] = None  # None: an error, or it was left
         self._is_asked_to_go_on = False
         self.goes_on = False
-        self.is_left = False  # for a place elsewhere, which also departures note
+        self.is_left = False  # for a place elsewhere. `execution.departure` sets it
 
     # -- going on
 

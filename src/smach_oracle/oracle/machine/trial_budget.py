@@ -4,7 +4,7 @@ import contextlib
 import threading
 from collections import deque
 from statistics import median
-from typing import Deque, Iterator, List, Optional, Sequence, Tuple
+from typing import Deque, Iterator, List, Optional, Sequence, Set, Tuple
 
 from ..scope.clock import Clock, PausableClock
 from ..settings.checks import Budget
@@ -33,7 +33,7 @@ class TrialBudget:
         with self._lock:
             self._limits = limits
             self._recoveries = self._questions = 0
-            self._takers: List[object] = []  # each has one recovery set aside
+            self._takers: Set[object] = set()  # each has one recovery set aside
             self.time.begin()
             self.work_time.begin()
 
@@ -121,14 +121,14 @@ class TrialBudget:
         :param most: of which a policy makes do.
         """
         with self._lock:
-            if self._has_set_aside(taker):
+            if taker in self._takers:
                 return ''
             why_not = self.why_no_recovery()
             if most is not None and self._recoveries >= most:
                 why_not = why_not or "the trial's {} attempts are spent".format(most)
             if not why_not:
                 self._recoveries += 1
-                self._takers.append(taker)
+                self._takers.add(taker)
             return why_not
 
     def settle_recovery(self, taker: object, is_made: bool) -> None:
@@ -137,12 +137,9 @@ class TrialBudget:
         One that was left behind may be of an earlier trial. Nothing is set aside for it.
         """
         with self._lock:
-            if self._has_set_aside(taker):
-                self._takers = [each for each in self._takers if each is not taker]
+            if taker in self._takers:
+                self._takers.remove(taker)
                 self._recoveries -= not is_made
-
-    def _has_set_aside(self, taker: object) -> bool:
-        return any(each is taker for each in self._takers)
 
     def why_no_question(self) -> str:
         """Say that the questions are spent."""
