@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """SimpleActionState against real action servers: what a script sees in good times."""
 
-import statistics
 import subprocess
 import sys
 import threading
@@ -88,19 +87,6 @@ class SimpleActionStateTest(unittest.TestCase):
             (Behaviour.FEEDBACK, 'succeeded'),
         ):
             self.assertEqual(action_state(number).execute(userdata()), outcome)
-
-    def test_a_round_trip_costs_milliseconds(self):
-        state, nothing, times = action_state(150), userdata(), []
-        for _ in range(60):
-            begin = time.monotonic()
-            self.assertEqual(state.execute(nothing), 'succeeded')
-            times.append(time.monotonic() - begin)
-        print(
-            'goal round trip: median %.2f ms, max %.2f ms'
-            % (1e3 * statistics.median(times), 1e3 * max(times))
-        )
-        quick = statistics.quantiles(times)[0]  # what else the machine does can only make it slower
-        self.assertLess(quick, 0.025)
 
     def test_states_and_executions_leave_no_threads_behind(self):
         states = [action_state(150) for _ in range(20)]

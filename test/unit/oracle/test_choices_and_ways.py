@@ -3,11 +3,13 @@
 import threading
 
 import pytest
+from fake_clock import FakeClock
 from machines import FakeExpert, Gate, Scripted, Watched, give_up, supersede, watched
 from test_still_running import SOON, letting_go
 from test_ways import FAILS, at_once, failing
 
 import smach
+from smach_oracle.oracle import oracle_of
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 ENDS = ['done', 'aborted', 'preempted']
@@ -38,11 +40,17 @@ def test_a_choice_has_the_key_of_the_way_of_the_menu_that_leads_there(policy):
 
 
 def test_a_choice_takes_as_long_as_the_way_that_leads_there():
-    question, machine = asked_about(5, 'escalating')
+    fake_clock = FakeClock()  # it stands from the decision on, until the question is made
+    expert = FakeExpert(supersede('ok'))
+    fails = [lambda state, ud: fake_clock.advance(30.0) or 'aborted'] * len(FAILS)
+    machine = failing(5, fails=fails, expert=expert, settings={'policy': 'escalating'})
+    oracle_of(machine.machine).count_work_by(fake_clock)
+    assert machine.run() == 'done'
+    (question,) = expert.questions
     menu = machine.of(EventKind.DECISION)[-1].data['menu']
     for choice in question.choices:
         minutes = [way['minutes'] for way in menu if way['target'] == choice.state]
-        assert choice.minutes == pytest.approx(minutes[0] if minutes else 0.0, rel=0.5)
+        assert choice.minutes == pytest.approx(minutes[0] if minutes else 0.0)
         assert bool(choice.minutes) == bool(choice.way)
 
 
