@@ -25,6 +25,7 @@ _of_functions: List[Decision] = []
 _of_objects: Dict[Tuple[int, str], Tuple['weakref.ref[object]', Callable[[Any], None]]] = {}
 _masks: Dict[int, Set[int]] = {}  # of threads that fork now, as they were before
 _forked = False
+process = os.getpid()  # this one: the operating system takes longer to say so
 
 
 def in_child(decision: Decision) -> None:
@@ -85,8 +86,8 @@ def _after() -> None:
 
 
 def _decide() -> None:
-    global _forked
-    _forked = True
+    global _forked, process
+    _forked, process = True, os.getpid()
     mask = _masks.pop(threading.get_ident())
     _masks.clear()
     owned = [(owner(), function) for owner, function in list(_of_objects.values())]

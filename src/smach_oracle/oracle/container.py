@@ -405,7 +405,7 @@ class OracleContainer(smach.StateMachine):
                     # seen for the first time, no plain success, or no outcome at all
                     plain = False
                 if not plain:
-                    ended = end_plainly(node, record, outcome)
+                    ended = end_plainly(node, record, outcome, states, transitions)
                     if ended is not None:
                         return ended
                     return Step(node, record).ended(outcome, error)

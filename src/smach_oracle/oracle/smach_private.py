@@ -296,11 +296,10 @@ class EngineProbe:
         # of a re-entrant lock
         is_owned = getattr(machine._state_transitioning_lock, '_is_owned', None)
         self.lock_is_held = is_owned is None or is_owned()
-        steps = classes.steps_of(type(machine))
-        self.tells_transitions = steps.tells_transitions
-        self.stays_attentive = stays_attentive or steps.is_asked
+        _, once, is_asked, self.tells_transitions, is_smachs = classes.steps_of(type(machine))
+        self.stays_attentive = stays_attentive or is_asked
         step = getattr(machine, '_update_once', None)
-        self.has_own_loop = steps.is_smachs and getattr(step, '__func__', None) is steps.once
+        self.has_own_loop = is_smachs and getattr(step, '__func__', None) is once
 
     def __reduce__(self) -> Tuple[Type['EngineProbe'], Tuple[()]]:
         """A copied or pickled machine is looked at when it executes."""

@@ -1,6 +1,7 @@
 """What an operator is told of containers that go elsewhere or stop, at any moment of that."""
 
 import threading
+from typing import NamedTuple
 
 import pytest
 from fake_clock import FakeClock
@@ -13,6 +14,12 @@ from smach_oracle.oracle.control.control import Control, Engine, HeldPlace, Jump
 from smach_oracle.oracle.records.events import EventKind
 
 HERE = HeldPlace('TOP', 'A')
+
+
+class Named(NamedTuple):
+    """A fake container."""
+
+    key: str
 
 
 class OfAMachine(Engine):
@@ -36,7 +43,7 @@ def test_a_container_that_ends_on_its_way_is_no_more_on_its_way() -> None:
     control.ask_jump('TOP', Jump('C'))
     control.end(*control._holds)
     assert control.take_jump('TOP') == Jump('C')
-    assert control.leave(OfAMachine(), lambda: 'TOP') is None
+    assert control.leave(OfAMachine(), Named('TOP')) is None
     assert control.resume() == () and not control.is_set
 
 
@@ -44,7 +51,7 @@ def test_a_container_that_ends_before_its_way_tells_where_it_was_to_go() -> None
     control = Control(FakeClock())
     control.ask_jump('TOP', Jump('C'))
     assert control.is_set
-    assert control.leave(OfAMachine(), lambda: 'TOP') == Jump('C')
+    assert control.leave(OfAMachine(), Named('TOP')) == Jump('C')
     assert not control.is_set
 
 

@@ -9,7 +9,7 @@ import math
 import threading
 from dataclasses import dataclass
 from enum import Enum
-from typing import Callable, Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
+from typing import Dict, Iterator, List, NamedTuple, Optional, Protocol, Tuple, Union
 
 from ..scope.clock import Clock, Flag
 from ..scope.scope import Reason, Scope
@@ -76,6 +76,14 @@ class Engine(Protocol):
 
     attentive: bool
     stays_attentive: bool  # whatever the operator wants
+
+
+class Keyed(Protocol):
+    """A container by the key with which its jumps are asked for (`TreeNode`)."""
+
+    @property
+    def key(self) -> str:
+        """The key, which its place makes up."""
 
 
 class Jump(NamedTuple):
@@ -146,14 +154,14 @@ class Control:
         self._engines[id(engine)] = engine
         self.calm(engine)
 
-    def leave(self, engine: Engine, key_of: Callable[[], str]) -> Optional[Jump]:
+    def leave(self, engine: Engine, node: Keyed) -> Optional[Jump]:
         """Forget a machine whose execution is over, and return the jump that it has not made."""
         self._engines.pop(id(engine), None)
         if not (self._moving or self._jumps):
             return None
         with self._lock:
-            self.arrived(key_of())
-            return self.take_jump(key_of())
+            self.arrived(node.key)
+            return self.take_jump(node.key)
 
     def calm(self, engine: Engine) -> None:
         """Let a machine take the short way again, where nothing is set.

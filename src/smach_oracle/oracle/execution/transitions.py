@@ -1,6 +1,6 @@
 """Moves a machine on: to a state, or to its end."""
 
-from typing import Any, NamedTuple, Optional
+from typing import Any, Container, NamedTuple, Optional
 
 import smach
 
@@ -11,6 +11,7 @@ from ..records.events import EventKind
 from ..recovery.stop import note_obeyed
 from ..settings.failing_outcomes import PREEMPTED
 from ..smach_private import (
+    Transitions,
     current_label_of,
     current_state_of,
     has_preempt_flag,
@@ -20,7 +21,6 @@ from ..smach_private import (
     set_preempt_flag,
     set_preempted_state,
     states_of,
-    transitions_of,
 )
 
 
@@ -90,30 +90,31 @@ def _end(node: TreeNode, label: str, outcome: str, container_outcome: str) -> st
     set_current_label(machine, None)
     if node.site.is_container:
         smach.loginfo(
-            "State machine terminating '{}':'{}':'{}'".format(label, outcome, container_outcome)
+            "State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome)
         )
     machine.call_termination_cbs([label], container_outcome)
     return container_outcome
 
 
-def end_plainly(node: TreeNode, record: StateRecord, outcome: Any) -> Optional[str]:
+def end_plainly(
+    node: TreeNode, record: StateRecord, outcome: Any, states: Container[str], drawn: Transitions
+) -> Optional[str]:
     """End the container the short way, where its last state has ended plainly as once before.
 
-    It returns the container's outcome, None where more is to be done than that.
+    It returns the container's outcome, None where more is to be done than that. `states`: of the
+    container. `drawn`: the transitions of its last state.
     """
-    machine, label = node.machine, record.label
-    states, transitions = states_of(machine), transitions_of(machine)
     try:
         edge = record.fast[outcome]
-        drawn = transitions[label][outcome]
+        is_drawn = drawn[outcome] is edge.drawn
     except (KeyError, TypeError):  # seen for the first time, or no outcome at all
         return None
     ending = edge.leads_to
     if (
-        drawn is not edge.drawn
+        not is_drawn
         or ending in states
         # a stop or an operator may have a say, and an early end of the trial
-        or has_preempt_flag(machine)
+        or has_preempt_flag(node.machine)
         or node.engine.attentive
         or node.tree.early_end.is_near()
         or smach.is_shutdown()
@@ -122,5 +123,5 @@ def end_plainly(node: TreeNode, record: StateRecord, outcome: Any) -> Optional[s
     edge.count += 1
     node.records.history.visited(edge.visit, record.has_preconditions)
     if node.events.observers:
-        node.emit(EventKind.TRANSITION, state=label, outcome=outcome, target=ending)
-    return _end(node, label, outcome, ending)
+        node.emit(EventKind.TRANSITION, state=record.label, outcome=outcome, target=ending)
+    return _end(node, record.label, outcome, ending)

@@ -144,7 +144,7 @@ class ContainerRecords:
 
     def drop_snapshots(self) -> None:
         """Let go of the userdata that snapshots refer to, and of entries that never came."""
-        self.take_up_work()
+        self._work, self._is_drawn = None, False
         for record in list(self.by_label.values()):
             record.snapshot = None
             if record.special:

@@ -66,6 +66,8 @@ class Execution:
         Return whether it still may.
         """
         runs = self.runs_around = runs_around(self._node)
+        if not runs:
+            return self._node.tree.scope.cancelled is None
         for run in runs:
             run.tell(self._node.engine)
         return not self.is_left_behind()
@@ -77,7 +79,8 @@ class Execution:
         """
         if self._node.tree.scope.cancelled is not None:  # it lies in no other scope
             return True
-        return any(run.told is not None for run in self.runs_around)
+        runs = self.runs_around
+        return bool(runs) and any(run.told is not None for run in runs)
 
     @property
     def scope_around(self) -> Scope:
@@ -123,7 +126,7 @@ class Execution:
             set_executing(node.machine, False)
             if ends_program(error):
                 node.tree.early_end.of_program = error
-        dropped = node.tree.control.leave(node.engine, lambda: node.key)
+        dropped = node.tree.control.leave(node.engine, node)
         if dropped is not None:
             node.warn('has ended before it could be sent to {}'.format(dropped.named()))
         node.records.streaks.end_execution()

@@ -102,9 +102,9 @@ def containers_of(container: object) -> List[Tuple[str, smach.Container]]:
     ]
 
 
-def holds_containers(container: object) -> bool:
+def holds_containers(machine: smach.StateMachine) -> bool:
     """Whether one of its states is a container. Most machines have none."""
-    for state in list(children_of(container).values()):  # a plain loop: each trial asks it of all
+    for state in list(states_of(machine).values()):  # a plain loop: each trial asks it of all
         if isinstance(state, smach.Container):
             return True
     return False

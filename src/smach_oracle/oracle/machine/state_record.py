@@ -2,6 +2,7 @@
 
 import copy
 import threading
+from operator import attrgetter
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -45,6 +46,7 @@ class RateReading(NamedTuple):
 
 
 _NOTHING_TRIED = '', 0
+_COUNT_OF = attrgetter('count')
 _ENDS = object()  # no transition is drawn to it, so no machine goes on by it
 
 
@@ -250,7 +252,8 @@ class StateRecord:
         self.recoveries = self.fallbacks = self.unwell_repeats = 0
         self._tried = _NOTHING_TRIED
         self.settle_way(None)
-        self.forget_entry()  # of the machine of which this is a copy
+        if self.special:
+            self.forget_entry()  # of the machine of which this is a copy
         self._visits_before = self._visits + self._by_edges()
 
     @property
@@ -320,10 +323,7 @@ class StateRecord:
             self._ways.take_over(learned)
 
     def _by_edges(self) -> int:
-        count = self._retired
-        for edge in list(self.fast.values()):
-            count += edge.count
-        return count
+        return self._retired + sum(map(_COUNT_OF, list(self.fast.values())))
 
     def __getstate__(self) -> Dict[str, object]:
         """Leave out what belongs to an execution under way, which may go on meanwhile."""

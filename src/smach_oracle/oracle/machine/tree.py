@@ -4,13 +4,12 @@ These are the trial, its events, the expert and the threads that were left behin
 """
 
 import itertools
-import os
 import threading
 import uuid
 from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple, Type
 
 import smach
-from smach_oracle.forking import is_child
+from smach_oracle import forking
 
 from ..asking.question import Expert
 from ..control.control import Control
@@ -68,7 +67,7 @@ class Tree:
         self.rates_loaded = ''  # the rates file read last
         self._questions: int  # in this trial
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
-        self.process = os.getpid()
+        self.process = forking.process
         self.be_at_rest(expert, health)
 
     def be_at_rest(
@@ -102,7 +101,7 @@ class Tree:
 
     def is_parents(self) -> bool:
         """Whether this is a child process of the program to which the tree belongs."""
-        return is_child() and self.process != os.getpid()
+        return self.process != forking.process and forking.is_child()
 
     def silent_twin(self) -> 'Tree':
         """Return a tree for the same machines in a child process, with nothing of this one."""

@@ -53,8 +53,9 @@ class Streaks(Dict[str, OpenStreak]):
 
     def end_execution(self) -> None:
         """End all, but where a way has ended the execution."""
-        for label in [label for label, each in self.items() if not each.leaves]:
-            del self[label]
+        if self:
+            for label in [label for label, each in self.items() if not each.leaves]:
+                del self[label]
 
     def told(self) -> Told:
         """Return them as plain data, for `take_over`."""
