@@ -18,7 +18,8 @@ from smach_oracle.analysis.judging.account import Entry, account_of
 from smach_oracle.analysis.lasting.tries import StateTry, tries_of
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
-from smach_oracle.oracle.records.events import EventKind
+from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import STOPPING
 from smach_oracle.oracle.records.rates_format import write_learned
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
@@ -37,6 +38,8 @@ class RecordedTrial(NamedTuple):
     tries: Tuple[StateTry, ...] = ()  # of the states that failed, in ROS time
     account: Tuple[Entry, ...] = ()
     first_asked: Optional[float] = None  # ROS time (s) of the first question
+    # whether its program was to stop: the state that ended then taught nothing, whatever came of it
+    was_stopped: bool = False
 
 
 class JobProgress(NamedTuple):
@@ -173,6 +176,7 @@ class ReplicateRecords:
                 ),
                 default=None,
             ),
+            _was_stopped(content.events),
         )
 
     def is_complete(self, recorded: RecordedTrial) -> bool:
@@ -189,6 +193,8 @@ class ReplicateRecords:
     def _is_complete(self, recorded: RecordedTrial, seed: int, truths: Mapping[int, Any]) -> bool:
         summary = recorded.summary
         if summary.ending in (TrialEnding.UNFINISHED, TrialEnding.PREEMPTED) or seed not in truths:
+            return False
+        if recorded.was_stopped:
             return False
         if summary.cause is None and not summary.outcome:  # it was ended as it began
             return False
@@ -280,3 +286,15 @@ def _data_of(line: str) -> Mapping[str, Any]:
 def _seed_of(line: str) -> Optional[int]:
     seed = _data_of(line).get('seed')
     return seed if isinstance(seed, int) else None
+
+
+def _was_stopped(events: Sequence[Event]) -> bool:
+    """Whether the top machine was preempted, or a state of it ended at a shutdown."""
+    return any(
+        event.kind == EventKind.PREEMPT
+        or (
+            event.kind == EventKind.TRANSITION and not event.text and event.data == STOPPING['data']
+        )
+        for event in events
+        if event.path == events[0].path
+    )

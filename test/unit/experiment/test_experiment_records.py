@@ -2,12 +2,14 @@
 
 import json
 from pathlib import Path
+from typing import Mapping, Sequence
 
 import pytest
 
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.experiment.records import ReplicateRecords
 from smach_oracle.oracle.records.events import EventKind, EventSource
+from smach_oracle.oracle.records.facts import STOPPING, UNCOUNTED
 from smach_oracle.ros.recorder import TrialRecorder
 
 FIRST_SEED = 100
@@ -24,9 +26,16 @@ class RecordedJob:
     def tidy_up(self):
         return ReplicateRecords(self.folder, FIRST_SEED, self._trials).tidy_up()
 
-    def record(self, *outcomes: str, start: int = 0, truth: bool = True, end: bool = True) -> None:
+    def record(
+        self,
+        *outcomes: str,
+        start: int = 0,
+        truth: bool = True,
+        end: bool = True,
+        last: Sequence[Mapping[str, object]] = (),
+    ) -> None:
         """One trial for each outcome, from trial `start` on; `end`: whether they come to their
-        ends.
+        ends; `last`: fields of events before that.
         """
         for trial, outcome in enumerate(outcomes, start):
             recorder = TrialRecorder(str(self.folder), warn=pytest.fail)
@@ -35,6 +44,8 @@ class RecordedJob:
             self.number += 1
             source.begin_trial('trial-{}'.format(self.number))
             source.emit(EventKind.TRIAL_START, 'TOP', data={'recovers': True})
+            for fields in last:
+                source.emit(**fields)
             if end:
                 source.emit(
                     EventKind.TRIAL_END,
@@ -115,6 +126,38 @@ def test_an_interrupted_trial_is_dropped_with_its_truth_and_its_rates(
         ]
     job.record('aborted', start=2)  # run again
     assert job.tidy_up().next_trial == 3 and job.kept_rates() == job.learned(2)
+
+
+@pytest.mark.parametrize(
+    'last',
+    [
+        {'kind': EventKind.PREEMPT},
+        {'kind': EventKind.TRANSITION, 'outcome': 'ok', 'target': 'succeeded', **STOPPING},
+    ],
+)
+def test_a_trial_whose_last_state_ended_as_the_program_was_to_stop_is_run_again(
+    job: RecordedJob, last: dict
+) -> None:
+    """It succeeded, and its rates lack what the last state would have taught."""
+    job.record('succeeded')
+    job.record('succeeded', start=1, last=[{'path': 'TOP', 'state': 'PLACE', **last}])
+    progress = job.tidy_up()
+    assert (progress.next_trial, len(progress.dropped)) == (1, 1)
+    assert job.kept_rates() == job.learned(0) and job.seeds_told() == [FIRST_SEED]
+
+
+@pytest.mark.parametrize(
+    'last',
+    [
+        {'kind': EventKind.PREEMPT, 'path': 'TOP/IN'},
+        {'kind': EventKind.TRANSITION, 'path': 'TOP', 'outcome': 'ok', **UNCOUNTED},
+    ],
+)
+def test_one_in_which_a_part_was_preempted_or_not_counted_is_complete(
+    job: RecordedJob, last: dict
+) -> None:
+    job.record('succeeded', last=[{'state': 'PLACE', **last}])
+    assert job.tidy_up().next_trial == 1
 
 
 def test_a_trial_that_was_ended_as_it_began_is_run_again(job: RecordedJob) -> None:
