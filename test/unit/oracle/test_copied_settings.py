@@ -1,5 +1,6 @@
 """A shallow copy of a machine has settings and records of its own. What `add` was given."""
 
+import contextlib
 import copy
 import pickle
 
@@ -102,3 +103,15 @@ def test_a_machine_that_was_pickled_in_another_process_is_this_ones():
     machine = pickle.loads(made)
     assert not oracle_of(machine).is_parents
     assert machine.execute() == 'done' and machine.rates()[0].successes == 1
+
+
+@pytest.mark.parametrize('settings', [{}, {'failing_outcomes': ['lost']}])
+def test_a_copied_or_pickled_machine_has_its_failing_outcomes(settings):
+    machine = OracleContainer.wrap(chain_of(Plain()), settings=settings)
+    copies = [copy.deepcopy(machine)]
+    with contextlib.suppress(TypeError):  # upstream's engine cannot pickle machines
+        copies.append(pickle.loads(pickle.dumps(machine)))
+    for each in copies:
+        failing = node_of(each).in_force.failing
+        assert ['line_lost' in failing, 'aborted' in failing] == [True, not settings]
+        assert each.execute() == 'done'

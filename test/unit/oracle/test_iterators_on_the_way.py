@@ -11,13 +11,14 @@ import smach
 from smach_oracle.oracle.records.events import EventKind
 
 ASKS = {'max_recoveries': 0}
+ENDS = ('done', 'aborted', 'preempted')
 TO_ABORTED = {'loop_outcomes': ['ok'], 'final_outcome_map': {'stuck': 'aborted'}}
 
 
-def each_of(state, label, items=(1, 2), loop=('done',), **contained):
+def each_of(state, label, items=(1, 2), loop=('done',), ends=ENDS, **contained):
     """An Iterator over a machine or a state; its item is under the key `label`."""
     iterator = smach.Iterator(
-        outcomes=['done', 'aborted', 'preempted'],
+        outcomes=list(ends),
         input_keys=[],
         output_keys=[],
         it=list(items),
@@ -69,6 +70,28 @@ def test_an_iterator_that_was_left_goes_on_whatever_its_author_makes_of_its_end(
     )
     assert machine.run() == 'done'
     assert machine.visits() == ['ALL', 'A', 'A', 'ALL', 'A', 'A'], 'items 1, 2 and 2, 3'
+
+
+@pytest.mark.parametrize('is_machine', [True, False])
+def test_an_iterator_that_was_left_for_a_failing_item_goes_on_with_it(is_machine):
+    """No outcome of the Iterator says that anything was left."""
+    work = Scripted('ok', 'aborted')
+    items = each_of(
+        chain(WORK=work) if is_machine else work,
+        'item',
+        (1, 2, 3),
+        loop=('ok', 'done'),
+        ends=['done'],
+        final_outcome_map={'aborted': 'done', 'preempted': 'done'},
+    )
+    machine = chain(ALL=items, A=Scripted('aborted'))
+    expert = FakeExpert(goto('A', container='TOP'), goto('ALL'))
+    settings = {'policy': 'always_ask', 'author_recoveries': 'override'}
+    watched = Watched(machine, name='TOP', expert=expert, settings=settings)
+    assert watched.run() == 'done'
+    assert work.runs == 4, 'items 1, 2 and 2, 3'
+    told = [event.text for event in watched.of(EventKind.WARNING)]
+    assert told == ['goes on with item 2 of 3, which is repeated']
 
 
 def test_an_item_that_ends_under_a_preempt_is_done_again_where_the_iterator_goes_on():

@@ -9,13 +9,13 @@ import smach
 from ..machine import nesting
 from ..machine.execution import why_no_outcome
 from ..machine.items import TrackedItems
-from ..machine.nesting import branching_below
+from ..machine.nesting import branching_below, nodes_in, nodes_of
 from ..machine.places import links_to
 from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import BRANCHES
 from ..recovery.stack_room import too_deep_below, too_deep_here
-from ..smach_private import Labels, data_of, is_executing, mark_on
+from ..smach_private import Labels, data_of, is_executing, mark_on, states_of
 from .branch import Branch
 
 
@@ -237,3 +237,14 @@ def wrappers_in(node: TreeNode, label: str) -> List[Tuple[str, ContainerWrapper]
         )
         if wrapper is not None and below[0] == label
     ]
+
+
+def goes_on_inside(node: TreeNode, label: str) -> bool:
+    """Whether a container in a state goes on where it stood when the program was stopped."""
+    if not node.tree.is_resumed:
+        return False
+    outermost = nodes_in(states_of(node.machine)[label]) if node.has(label) else []
+    below = (each for outer in outermost for each in nodes_of(outer.machine))
+    return any(node.tree.resumed.goes_on(each.records) for each in below) or any(
+        wrapper.is_resumed for _, wrapper in wrappers_in(node, label)
+    )

@@ -23,7 +23,7 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, G
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
-from ..branches.wrapper import wrappers_around, wrappers_in
+from ..branches.wrapper import goes_on_inside, wrappers_around
 from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace
 from ..machine.tree_node import TreeNode
@@ -56,6 +56,8 @@ _COMMITTED = {
     EventKind.TRIAL_END,
 }
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
+# after which another state is next
+_LEADS = frozenset((EventKind.TRANSITION, EventKind.JUMP, EventKind.SENT))
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 
 
@@ -294,16 +296,13 @@ class Checkpointer:
                 if start
             ]
             yield fact_of(node.key, AT, [label, IN, *sent_to[-1:]])
-            if is_container and not (
-                any(self._top.tree.resumed.goes_on(each.records) for each in below)
-                or any(wrapper.is_resumed for _, wrapper in wrappers_in(node, label))
-            ):
+            if is_container and not goes_on_inside(node, label):
                 yield from self._not_begun_below(path)
         elif (
             kind is EventKind.CONTAINER_START and node is self._top and not self._enters_again(node)
         ):
             yield fact_of(node.key, AT, [label, BEFORE])  # others do not have their inputs yet
-        elif kind in (EventKind.TRANSITION, EventKind.JUMP) and (node.has(event.target)):
+        elif kind in _LEADS and node.has(event.target):
             yield fact_of(node.key, AT, [event.target, BEFORE, data.get(JUMPED_TO)])
         elif TAKEN_UP in data:
             failed, *told = data[TAKEN_UP]

@@ -25,7 +25,7 @@ from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
-from ..settings.checks import ASK, RESTART
+from ..settings.checks import ASK, RESTART, STATE
 from ..settings.failure_rule import FORMER_RULE, RULE, rule_in
 from ..settings.settings import GROUPS
 from .checkpointer import Checkpointer
@@ -62,6 +62,11 @@ _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
 _Read = TypeVar('_Read')
 BEGINS_ANEW = '{}: the stored trial of {} is over, and a new one begins: {}'
+NO_ORACLE = (
+    '{}: the trial of {} was stopped, and only an oracle goes on with the state that ran then '
+    '(recover=False, --without-oracle). Execute it with an oracle. Or say how without one: '
+    'on_resume is state:LABEL or restart, or `oracle_state` drops the trial. It is kept until then'
+)
 NOT_STORED = (
     '{}: {} was not written any more after a fault of the store, so other states may '
     'have run since then. A person is asked before anything moves'
@@ -134,6 +139,8 @@ class TrialStore:
                 last.number, time.time(), top.label if top.phase == ENDED else RESTARTED
             )
             return self._to_resume() if top.phase == ENDED else None
+        if not self._top.tree.recover and word != STATE:
+            raise CheckpointError(NO_ORACLE.format(self._top.path, self._store.path))
         resumed = self._resumption(last, tree, moments, earlier)
         if resumed.renamed:
             self._store.keep_structure(self._structure)

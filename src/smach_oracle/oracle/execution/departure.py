@@ -68,10 +68,11 @@ def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
     :param left_nodes: innermost first. That of the failure ends by itself.
     """
     around = [link.inner_container for node in reversed(left_nodes) for link in links_to(node)]
-    for container in around[:-1]:
+    for container in around:
         wrapper = wrapper_of(container)
         if isinstance(wrapper, IteratorWrapper):
             wrapper.is_left = True
+    for container in around[:-1]:
         if not container.preempt_requested():
             request_preempt(container)
 

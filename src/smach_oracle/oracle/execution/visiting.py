@@ -4,7 +4,8 @@ from time import monotonic
 
 import smach
 
-from ..machine.repeats import note_visit
+from ..branches.wrapper import goes_on_inside
+from ..machine.repeats import note_visit, why_held_back
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.userdata import UserdataGate, view_behind
@@ -54,7 +55,9 @@ def execute_watched(
     if node.in_force.deep_copy_keys:
         record.snapshot = node.snapshot()
     if node.tree.numbers_visits:
-        why_not = note_visit(node, record)
+        # what goes on where it stood is in its visit still
+        is_new = not goes_on_inside(node, record.label)
+        why_not = note_visit(node, record) if is_new else why_held_back(node, record)
         if why_not:
             return HeldBack(why_not)
     if way_down:

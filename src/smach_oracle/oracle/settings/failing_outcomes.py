@@ -2,7 +2,7 @@
 
 import re
 from functools import lru_cache
-from typing import Callable, Iterable, List, Optional, Pattern
+from typing import Callable, Iterable, List, Optional, Pattern, Tuple
 
 PREEMPTED = 'preempted'
 # the rule of earlier versions, by which their trials are counted. These come first of several
@@ -59,6 +59,10 @@ class FailingNames:
 
     def __contains__(self, outcome: object) -> bool:
         return isinstance(outcome, str) and self._names_failure(outcome)
+
+    def __reduce__(self) -> Tuple[object, ...]:
+        """Return how a copied or pickled one is made: by its words."""
+        return type(self), (None if self.by_name else self.first,)
 
     def excuse(self, outcome: str) -> bool:
         """Whether an outcome is no failure of its state although it ends the container in one."""

@@ -18,6 +18,7 @@ from test_unanswered import Answers, nobody, questions
 import smach
 from smach_oracle.oracle import Expert, OperatorHand, OracleContainer
 from smach_oracle.oracle.checkpoint.container_facts import fact_of
+from smach_oracle.oracle.errors import CheckpointError
 from smach_oracle.store.rows import NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
 
@@ -337,7 +338,10 @@ def observed(folder, kill_at, **settings):
             settings=dict(NEVER, checkpoint=str(folder / 'robot.db'), **settings),
         )
         machine.events.observers.append(points)
-        return machine.execute()
+        try:
+            return machine.execute()
+        except CheckpointError as err:
+            return str(err)
 
     return in_a_process(work)
 
@@ -345,6 +349,8 @@ def observed(folder, kill_at, **settings):
 def test_without_an_oracle_no_state_is_held_back(tmp_path):
     assert observed(tmp_path, 14) is None
     assert Diary(str(tmp_path / 'diary')).count('begins')['CARRY'] == 1
+    for on_resume in ('ask', 'recover'):  # as often as it is tried
+        assert 'only an oracle goes on with' in observed(tmp_path, 0, on_resume=on_resume)
     assert observed(tmp_path, 0, on_resume='state:POUR') == 'succeeded'
     assert Diary(str(tmp_path / 'diary')).count('begins') == {'LOOK': 1, 'POUR': 2, 'CARRY': 2}
 

@@ -62,15 +62,16 @@ def chain(*labels, failing=''):
 
 
 @functools.lru_cache(maxsize=None)
-def nested(*labels):
-    """The same in a container, before a last state."""
+def nested(*labels, failures=0):
+    """The same in a container, before a last state, which fails so often."""
 
     def build(diary, points):
         machine = smach.StateMachine(['succeeded', 'aborted'])
         machine.userdata.done = []
         with machine:
             smach.StateMachine.add('KITCHEN', chain(*labels)(diary, points), {'succeeded': 'LAST'})
-            smach.StateMachine.add('LAST', Noted('LAST', diary, points), ENDS)
+            last = Noted('LAST', diary, points, failures=failures)
+            smach.StateMachine.add('LAST', last, ENDS)
         return machine
 
     return build
@@ -358,3 +359,14 @@ def test_a_script_that_has_changed_twice_goes_on_by_the_names_of_each(tmp_path):
     assert told.get('outcome') == 'succeeded', told
     assert 'TOP: goes on with LOOK as SEE' in told['log']
     assert third.diary.count('begins')['POUR'] == 1
+
+
+@pytest.mark.parametrize('on_retry', ['never', 'confirm'])
+def test_what_was_done_in_a_container_that_goes_on_is_not_repeated_with_it(tmp_path, on_retry):
+    """The failure comes later, behind the container."""
+    guarded = {'states': {'KITCHEN/POUR': {'on_retry': on_retry}}}
+    build = nested('LOOK', 'POUR', 'CARRY', failures=9)
+    killed = killed_in(tmp_path, build, 'CARRY', **guarded)
+    assert killed.run(expert=ByHand(), **guarded)['outcome'] == 'succeeded'
+    begins = killed.diary.count('begins')
+    assert begins['POUR'] == 1 and begins['LAST'] > 1

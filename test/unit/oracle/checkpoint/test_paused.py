@@ -91,6 +91,28 @@ def test_it_is_paused_where_it_goes_on_and_says_so(tmp_path, log, commands, is_p
     assert killed.diary.count('begins') == {'A': 1, 'B': 1, 'C': 1}  # what is killed writes none
 
 
+def test_where_a_held_machine_was_sent_it_waits_after_a_crash(tmp_path):
+    killed = KilledMachine(make(tmp_path / 'killed'), build)
+
+    def is_sent():
+        machine = held(killed)
+        machine.hand.pause(by='ann')
+        machine.begin().waits_before('TOP/A')
+        machine.hand.go_to('TOP', 'C', by='ann')
+        machine.waits_before('TOP/C')
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    def goes_on():
+        with held(killed).begin() as machine:
+            machine.waits_before('TOP/C')
+            machine.hand.resume()
+            return machine.end()
+
+    assert in_a_process(is_sent) is None
+    assert in_a_process(goes_on) == 'succeeded'
+    assert killed.diary.count('begins') == {'C': 1}
+
+
 def test_a_command_of_which_nothing_is_kept_makes_no_moment(tmp_path):
     moments = []
     for times in (1, 5):
