@@ -398,7 +398,7 @@ class OperatorHand:
         :raises OperatorError: where there is none.
         """
         top = self._top
-        nodes = list(nodes_of(top.machine))
+        nodes = nodes_of(top.machine)
         found = [node for node in nodes if node.path == (path.strip('/') or top.path)]
         if not found:
             raise OperatorError(

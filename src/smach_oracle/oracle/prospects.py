@@ -145,7 +145,7 @@ class Unguarded:
 
 def prospects_of(machine: smach.StateMachine) -> List[ContainerProspect]:
     """Return what the oracle may do in a wrapped machine, and in those nested in it."""
-    nodes = list(nodes_of(machine))
+    nodes = nodes_of(machine)
     decides = nodes[0].settings.budget.recoveries != 0  # the budget is that of the top
     unguarded = Unguarded(nodes[0])
     found: List[ContainerProspect] = []

@@ -12,7 +12,7 @@ from forked import in_a_fork
 
 import smach
 from smach_oracle.oracle import OracleContainer
-from smach_oracle.oracle.machine.nesting import containers_in
+from smach_oracle.oracle.machine.nesting import nodes_of
 from smach_oracle.oracle.machine.tree_node import marked_node
 
 GROWN = 600  # states
@@ -39,7 +39,7 @@ def test_a_tree_can_be_looked_through_while_a_machine_of_it_grows():
     def look():
         while not grown.is_set():
             try:
-                looks.append(len(containers_in(top)))
+                looks.append(len(nodes_of(top)))
             except RuntimeError as err:
                 errors.append(err)
 

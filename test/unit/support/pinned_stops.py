@@ -123,7 +123,7 @@ class Stopped(Operated):
         elif drawn < 0.4:
             self._say(partial(self._hand.preempt, 'eva'))
         else:
-            machine = self._stops.choice(list(nodes_of(self.machine))).machine
+            machine = self._stops.choice(nodes_of(self.machine)).machine
             self.tell('PREEMPTED', machine._oracle.path)
             machine.request_preempt()
 

@@ -179,7 +179,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
     It is to be called once the trial has begun.
     """
     _forget(top)  # of an execution before that has ended early
-    nodes = list(nodes_of(top.machine))
+    nodes = nodes_of(top.machine)
     for node in nodes:
         stored = resumption.tree.container(node.key)
         for label, told in stored.states.items():

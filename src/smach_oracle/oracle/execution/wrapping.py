@@ -8,7 +8,7 @@ from ..asking.question import names
 from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError, TrialError
 from ..identity import set_class
-from ..machine.nesting import containers_in, holds_containers, machines_below, nodes_of
+from ..machine.nesting import holds_containers, machines_below, nodes_of
 from ..machine.oracle import load_rates
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, marked_node, node_of
@@ -101,8 +101,8 @@ def _wrap_again(
     top = marked_node(machine)
     before = top.settings
     try:
-        for container in containers_in(machine):
-            remove_oracle(marked_node(container))
+        for node in nodes_of(machine):
+            remove_oracle(node)
         top.tree.recover = tree.recover
         top.take_name(arguments.name)
         if tree.expert is not None:

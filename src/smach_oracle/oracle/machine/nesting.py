@@ -144,22 +144,17 @@ def items_under_way(node: TreeNode) -> str:
     return ' of '.join(found)
 
 
-def containers_in(machine: smach.StateMachine) -> List[smach.StateMachine]:
-    """Return a wrapped machine and all wrapped machines nested in it, each once."""
-    found = {id(machine): machine}
-    waiting = deque(found.values())
+def nodes_of(machine: smach.StateMachine) -> List[TreeNode]:
+    """Return the node of a container and those of all wrapped containers below it, each once."""
+    found = {id(machine): marked_node(machine)}
+    waiting = deque([machine])
     while waiting:
         for _, child in machines_below(waiting.popleft()):
-            if id(child) not in found and node_of(child) is not None:
-                found[id(child)] = child
-                waiting.append(found[id(child)])
+            node = node_of(child)
+            if id(child) not in found and node is not None:
+                found[id(child)] = node
+                waiting.append(child)
     return list(found.values())
-
-
-def nodes_of(machine: smach.StateMachine) -> Iterator[TreeNode]:
-    """Yield the node of a container and those of all wrapped containers below it, each once."""
-    for container in containers_in(machine):
-        yield marked_node(container)
 
 
 def records_of(node: TreeNode) -> Iterator[StateRecord]:
