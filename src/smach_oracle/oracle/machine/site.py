@@ -47,11 +47,9 @@ def failure_kind(
         return FailureKind.NOT_A_FAILURE
     if outcome in settings.failure_outcomes:
         return FailureKind.FAILING_OUTCOME
-    if route.is_state:
-        return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
-    if not route.target:
+    if not (route.is_state or route.target):
         return FailureKind.UNREGISTERED_OUTCOME
-    if route.target in failing:
+    if not route.is_state and route.target in failing:
         excused = failing.excuse(outcome)
         return FailureKind.NOT_A_FAILURE if excused else FailureKind.FELL_THROUGH
     return FailureKind.FAILING_OUTCOME if outcome in failing else FailureKind.NOT_A_FAILURE
