@@ -8,7 +8,7 @@ from ..decision.ways import RESTORE
 from ..machine.items import TrackedItems
 from ..machine.nesting import children_of, containers_of, machines_below
 from ..machine.tree_node import TreeNode, node_of
-from ..machine.userdata import restore, take_snapshot
+from ..machine.userdata import restore
 from ..recovery.failure import Failure, judge
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import Labels, data_of, items_of, mark_on
@@ -119,11 +119,7 @@ class IteratorWrapper(ContainerWrapper):
             unfinished = None if record is None else node.tree.resumed.unfinished(record)
             if unfinished is not None and unfinished.snapshot is not None:
                 data = unfinished.snapshot  # before the program was stopped: it has written since
-        self.at_item = self._snapshot(data)
-
-    def _snapshot(self, data: Mapping[str, object]) -> Dict[str, object]:
-        parent = self.parent
-        return take_snapshot(data, parent.in_force.deep_copy_keys, parent.warn_not_copied)
+        self.at_item = self.parent.snapshot(data)
 
     def _leave(self, outcome: object, error: Optional[BaseException]) -> None:
         """Tell that the container has ended, and let its states execute by themselves again."""
@@ -175,7 +171,7 @@ class IteratorWrapper(ContainerWrapper):
         )
         given = {} if userdata is None else {key: userdata[key] for key in both if key in userdata}
         if not self.goes_on:
-            self._given = self._snapshot(given)
+            self._given = parent.snapshot(given)
             return {}
         if (
             not cast('TrackedItems', self.tracked).is_finished

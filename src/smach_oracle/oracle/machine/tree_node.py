@@ -1,6 +1,7 @@
 """The node of one container: its place in the tree, and what is kept beside its machine."""
 
 import copy
+from functools import partial
 from typing import Any, Callable, Dict, Iterator, Mapping, Optional, Tuple
 
 import smach
@@ -15,9 +16,10 @@ from .execution import Execution
 from .site import Site
 from .state_record import RateReading, StateRecord
 from .tree import Tree
-from .userdata import NOT_COPIED, take_snapshot
+from .userdata import copied
 
 DEFAULT_NAME = 'SM_ROOT'
+NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
 
 
 def node_of(machine: object) -> Optional['TreeNode']:
@@ -267,8 +269,7 @@ class TreeNode:
         if self.tree.is_new(self.path, label, about):
             self.warn(text, label)
 
-    def warn_not_copied(self, key: str, why: str) -> None:
-        """Say that a key of `deep_copy_keys` is kept as it is."""
+    def _warn_not_copied(self, key: str, why: str) -> None:
         self.warn_once('copy of ' + key, NOT_COPIED.format(key, why))
 
     def begin_trial(self, trial_id: str) -> None:
@@ -299,11 +300,16 @@ class TreeNode:
         self.engine.look(self.machine, self.in_force.limits_autonomy, self.tree.classes)
         self.tree.control.attend(self.engine)
 
-    def snapshot(self) -> Dict[str, object]:
-        """Return the userdata as it is now."""
-        return take_snapshot(
-            data_of(self.machine.userdata), self.in_force.deep_copy_keys, self.warn_not_copied
-        )
+    def snapshot(self, data: Optional[Mapping[str, object]] = None) -> Dict[str, object]:
+        """Return userdata as it is now, or that in `data`.
+
+        It holds references. `deep_copy_keys` are copied through and through.
+        """
+        snapshot = dict(data_of(self.machine.userdata) if data is None else data)
+        for key in self.in_force.deep_copy_keys:
+            if key in snapshot:
+                snapshot[key] = copied(snapshot[key], partial(self._warn_not_copied, key))
+        return snapshot
 
     # -- learned rates, for a rates file (rates_file.Learner)
 

@@ -37,28 +37,6 @@ from ..smach_private import (
 )
 
 _GONE = object()  # in place of the value of a key that is not there
-NOT_COPIED = 'userdata key {!r} cannot be deep-copied, a reference is kept: {}'
-
-
-def take_snapshot(
-    data: Mapping[str, object], deep_copy_keys: Iterable[str], warn: Callable[[str, str], None]
-) -> Dict[str, object]:
-    """Return the userdata as it is now.
-
-    It holds references. `deep_copy_keys` are copied through and through. `warn` takes each key that
-    cannot be, with the reason.
-    """
-    snapshot = dict(data)
-    for key in deep_copy_keys:
-        if key in snapshot:
-            try:
-                snapshot[key] = copy.deepcopy(snapshot[key])
-            except BaseException as err:
-                # whatever a user's object raises: a reference is better than a dead machine
-                if ends_program(err):
-                    raise
-                warn(key, error_text(err))
-    return snapshot
 
 
 def restore(
@@ -82,12 +60,19 @@ def restore(
             del data[key]
 
 
-def copied(value: object) -> object:
+def copied(value: object, warn: Optional[Callable[[str], None]] = None) -> object:
+    """Return a deep copy of a value, the value itself where it cannot be copied.
+
+    `warn` takes the reason. It is not needed where that was said before, as the state began.
+    """
     try:
         return copy.deepcopy(value)
-    except BaseException as err:  # it could not be copied at entry either, and that was said then
+    except BaseException as err:
+        # whatever a user's object raises: a reference is better than a dead machine
         if ends_program(err):
             raise
+        if warn is not None:
+            warn(error_text(err))
         return value
 
 
@@ -203,8 +188,6 @@ class WriteWatch:
         data = dict(data_of(self._machine.userdata))
         self._kept.update(self.gate.written)
         self.gate.written.clear()  # the set itself: branches of the gate have it, too
-        if not self._deep:
-            return UserdataMark(data, {}, {})
         copies = {key: copied(data[key]) for key in self._deep if key in data}
         return UserdataMark(data, copies, {key: fingerprint(data[key]) for key in copies})
 
