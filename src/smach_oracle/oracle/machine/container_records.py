@@ -5,7 +5,7 @@ from typing import Any, Dict, Mapping, Optional, Tuple
 
 from ..decision.failure_rate import base_of
 from ..decision.policies import policy_named
-from ..decision.policy import FailureContext, Policy
+from ..decision.policy import Policy
 from ..records.history import History
 from ..records.streaks import Streaks
 from ..records.visits import Visit, VisitMarks, VisitResult
@@ -226,17 +226,6 @@ class ContainerRecords:
     def count_oracle_edge(self, target: str) -> None:
         """Count a way out of the meta state."""
         self.oracle_edges[target] = self.oracle_edges.get(target, 0) + 1
-
-    def failure_context(
-        self, record: StateRecord, initial: str, is_counted: bool = False
-    ) -> FailureContext:
-        """Return what the visits say about a failure of a state. It changes nothing.
-
-        `is_counted`: it is among them.
-        """
-        history = self.history
-        context = history.context_since if is_counted else history.failure_context
-        return context(record.label, initial, record.totals[0])
 
     def note_failure(self, record: StateRecord) -> None:
         """Note in the history that a state has failed, before its visit is added."""

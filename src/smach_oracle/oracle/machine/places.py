@@ -117,7 +117,9 @@ def failure_context(
     With `step_back_across` its initial state is that before the container, in the levels above,
     where there is one.
     """
-    context = node.records.failure_context(record, initial_label_of(node.machine), is_counted)
+    history = node.records.history
+    context_of = history.context_since if is_counted else history.failure_context
+    context = context_of(record.label, initial_label_of(node.machine), record.totals[0])
     before = _state_before(node) if node.settings.step_back_across else ''
     return context._replace(initial=before) if before else context
 
@@ -129,7 +131,8 @@ def _state_before(node: TreeNode) -> str:
     """
     levels = direct_levels(node)
     for child, above in zip(levels, levels[1:]):
-        context = above.records.failure_context(above.record(child.labels_from_parent[0]), '')
+        label = child.labels_from_parent[0]
+        context = above.records.history.failure_context(label, '', above.record(label).totals[0])
         name = above.in_force.policy.step_back_target(context)
         if name:
             return name if '/' in name else '{}/{}'.format(above.relative_path, name)
