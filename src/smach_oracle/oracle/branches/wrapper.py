@@ -22,12 +22,10 @@ from .branch import Branch
 class StoredPort(Protocol):
     """The part of a stored container that a Concurrence or an Iterator goes on from."""
 
-    keys: Dict[str, object]  # of its userdata
-    gone: List[str]  # keys that are not to be there
     item: int  # number of the one to begin with, from 1. 0 means the first
 
-    def complete_snapshots(self, data: Mapping[str, object]) -> None:
-        """Have the values that were not stored in the snapshots, too."""
+    def put_into(self, data: Dict[str, object]) -> None:
+        """Have userdata as they were."""
 
 
 class WrappedExecution:
@@ -106,11 +104,7 @@ class ContainerWrapper:
             return
         stored, self._resumed = self._to_resume(), None
         if stored is not None:
-            data = data_of(container.userdata)
-            for key in stored.gone:
-                data.pop(key, None)
-            data.update(stored.keys)
-            stored.complete_snapshots(data)
+            stored.put_into(data_of(container.userdata))
 
     def runner_of(self, container: smach.Container, label: str, state: smach.State) -> smach.State:
         """Return what executes a state.

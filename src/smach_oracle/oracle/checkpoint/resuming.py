@@ -131,9 +131,7 @@ class EntryPoint:
         """Have the userdata as it was, and the state in which it goes on as the current one."""
         node, stored = self._node, self._stored
         data = data_of(node.machine.userdata)
-        for key in stored.gone:
-            data.pop(key, None)
-        data.update(stored.keys)
+        stored.put_into(data)
         for key, why in sorted(stored.missing.items()):
             node.warn(
                 'userdata key {!r} {}'.format(
@@ -143,7 +141,6 @@ class EntryPoint:
                     else 'is missing, as ' + why,
                 )
             )
-        stored.complete_snapshots(data)
         for label, snapshot in stored.snapshots.items():
             if node.has(label):
                 node.record(label).snapshot = snapshot

@@ -78,6 +78,13 @@ class StoredContainer:
     item: int = 0
     gone: List[str] = field(default_factory=list)
 
+    def put_into(self, data: Dict[str, object]) -> None:
+        """Have userdata as they were, and in the snapshots what could not be stored."""
+        for key in self.gone:
+            data.pop(key, None)
+        data.update(self.keys)
+        self.complete_snapshots(data)
+
     def complete_snapshots(self, data: Mapping[str, object]) -> None:
         """Have in the snapshots what could not be stored, as the userdata have it now."""
         for key in self.missing:
