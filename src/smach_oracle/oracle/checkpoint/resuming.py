@@ -238,11 +238,7 @@ def let_repeat(top: TreeNode, paths: Sequence[str], by_command: Optional[Sequenc
     for path in [*paths, *(by_command or ())]:
         place = place_named(top, path, at_rest=True)
         if place is None and path in paths:
-            raise SettingsError(
-                GROUPS.key_of('resume_repeat'),
-                path,
-                'the label of a state of {}, or the path of one below it'.format(top.path),
-            )
+            raise _names_no_state('resume_repeat', path, top)
         if place is not None:
             begin_once_more(place.node, place.label)
             smach.logwarn(
@@ -259,12 +255,13 @@ def _jump_path_named(top: TreeNode, path: str) -> JumpPath:
     """
     way = jump_path_to(top, place_named(top, path))
     if way is None:
-        raise SettingsError(
-            GROUPS.key_of('on_resume'),
-            'state:' + path,
-            'the label of a state of {}, or the path of one below it'.format(top.path),
-        )
+        raise _names_no_state('on_resume', 'state:' + path, top)
     return way
+
+def _names_no_state(setting: str, value: str, top: TreeNode) -> SettingsError:
+    allowed = 'the label of a state of {}, or the path of one below it'.format(top.path)
+    return SettingsError(GROUPS.key_of(setting), value, allowed)
+
 
 
 class _Setting:
