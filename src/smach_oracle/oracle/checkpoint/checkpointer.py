@@ -25,7 +25,7 @@ from smach_oracle.store.store_writer import StoreWriter
 
 from ..branches.wrapper import goes_on_inside, wrappers_around
 from ..machine.nesting import nodes_of
-from ..machine.places import TreePlace
+from ..machine.places import TreePlace, direct_levels
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_FROM, JUMPED_TO, TAKEN_UP
@@ -449,9 +449,7 @@ class Checkpointer:
 
 def _begins_line(node: TreeNode) -> str:
     """Return the key of the outermost container around one that surely runs in its thread."""
-    while node.parent is not None and not node.runs_in_branch:
-        node = node.parent
-    return node.key
+    return direct_levels(node, at_rest=True)[-1].key
 
 
 def must_stop(node: TreeNode) -> bool:
