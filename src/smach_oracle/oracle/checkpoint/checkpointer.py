@@ -251,13 +251,10 @@ class Checkpointer:
     def _node_of(self, event: Event) -> Optional[TreeNode]:
         """Return the container that an event is of: that of a branch goes by its label as well."""
         known = self._known_node(event.path, event.state)
-        if known is not None:
-            return known
-        found = {node.key: node for node in nodes_of(self._top.machine)}
-        if found.keys() == self._nodes.keys():
-            return None
-        self._nodes = found
-        return self._node_of(event)
+        if known is None:  # a machine that was added since
+            self._nodes = {node.key: node for node in nodes_of(self._top.machine)}
+            known = self._known_node(event.path, event.state)
+        return known
 
     def _known_node(self, path: str, label: str) -> Optional[TreeNode]:
         for key in ('{}/{}'.format(path, label), path):
