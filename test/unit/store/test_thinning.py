@@ -8,7 +8,7 @@ from killed_machines import in_a_process
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
-from smach_oracle.store.codecs import CODECS, Codecs, Encoded
+from smach_oracle.store.codecs import Codecs, Encoded
 from smach_oracle.store.names import EDIT
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile, transaction
@@ -43,7 +43,7 @@ def drawn(chance, moments):
 
 
 def all_told(store, trial, moment):
-    tree = read_tree(store, trial, CODECS, moment)
+    tree = read_tree(store, trial, moment)
     return {
         path: {name: value for name, value in vars(container).items() if name != 'begun'}
         for path, container in tree.containers.items()
@@ -214,7 +214,7 @@ def test_a_trial_without_end_has_a_store_that_does_not_grow(tmp_path):
         assert moments[0].kind == 'TRIAL_START' and moments[-1].kind == 'TRIAL_END'
         sizes.append(path.stat().st_size)
         facts.append(len(list(store.facts(1))))
-        told = read_tree(store, 1, CODECS).container('TOP')
+        told = read_tree(store, 1).container('TOP')
         assert told.states['POUR']['counts'][0] == rounds - 1
         assert told.marks['POUR'][2] is True
         assert len(told.visits) >= 50 and told.visits_of_execution == 2 * rounds - 1

@@ -38,7 +38,7 @@ from smach_oracle.oracle.records.history import History
 from smach_oracle.oracle.records.streaks import OpenStreak
 from smach_oracle.oracle.records.visits import VisitResult
 from smach_oracle.oracle.settings.settings import StateSettings
-from smach_oracle.store.codecs import CODECS, Encoded
+from smach_oracle.store.codecs import Encoded
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_file import NewTrial, StoreFile
 
@@ -75,7 +75,7 @@ class Trial:
 
     def read(self, until: Optional[int] = None) -> StoredTree:
         """What it says."""
-        return read_tree(self.store, self.number, CODECS, until)
+        return read_tree(self.store, self.number, until)
 
 
 def tell() -> Dict[str, List[str]]:
@@ -123,7 +123,7 @@ def _of_userdata(rng: random.Random, trial: Trial) -> Iterator[str]:
     """Userdata of a container that change, and what is told of them each time."""
     data: Dict[str, Any] = {}
     kept_out: List[Any] = []
-    facts = UserdataFacts(CODECS, 'T', kept_out.append)
+    facts = UserdataFacts('T', kept_out.append)
     for _ in range(30):
         for _ in range(rng.choice((0, 1, 2))):
             key, other = rng.choice(KEYS), rng.choice(KEYS)

@@ -43,7 +43,6 @@ from smach_oracle.oracle.machine.oracle import oracle_of
 from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.prospects import prospects_of
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
 TREES, OPERATED, KILLED = 160, 60, 96
@@ -327,7 +326,7 @@ def _stored(path: str) -> List[str]:
             'MOMENT {} {}'.format(each.seq, written(each._replace(at=0)))
             for each in store.moments(trial.number)
         ]
-        tree = read_tree(store, trial.number, CODECS)
+        tree = read_tree(store, trial.number)
         lines += [
             'WHOLE {} {}'.format(name, written(value))
             for name, value in sorted(tree.whole.items())

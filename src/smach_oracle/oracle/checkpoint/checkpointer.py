@@ -1,7 +1,7 @@
 """Stores where every container of a tree stands, before each state begins."""
 
-import functools
 import time
+from functools import lru_cache, partial, wraps
 from typing import (
     Callable,
     Dict,
@@ -18,7 +18,6 @@ from typing import (
 
 import smach
 from smach_common.foreign import ends_program, error_text
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, GOAL, IN, ITEMS
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
@@ -75,7 +74,7 @@ def _while_it_works(store: Callable[..., None]) -> Callable[..., None]:
     but that there was one.
     """
 
-    @functools.wraps(store)
+    @wraps(store)
     def stored(self: 'Checkpointer', *args: object) -> None:
         if self.is_broken:
             return
@@ -121,7 +120,7 @@ class Checkpointer:
         self._ran: Dict[str, Set[str]] = {}  # labels by container, since its last commit
         self._entered: Dict[str, List[TreeNode]] = {}  # by line, since its last commit
         # most events ask it
-        self._wrappers_around = functools.lru_cache(None)(wrappers_around)
+        self._wrappers_around = lru_cache(None)(wrappers_around)
         self._wrote: Dict[str, str] = {}  # path of the state that ran last, by that of userdata
         self._spent_stored: Dict[str, object] = {}
         self._seq_stored = -1
@@ -391,13 +390,9 @@ class Checkpointer:
         yield from self._facts_of(node).changed(list(labels))
         if self._enters_again(node):
             return
-        reached = (
-            None
-            if all_keys
-            else frozenset().union(*(keys_of(node.machine, label) for label in labels))
-            if labels
-            else frozenset()
-        )
+        reached: Optional[FrozenSet[str]] = None
+        if not all_keys:
+            reached = frozenset().union(*(keys_of(node.machine, label) for label in labels))
         yield from self._keys(node.path, data_of(node.machine.userdata), reached)
 
     def _keys(
@@ -405,9 +400,7 @@ class Checkpointer:
     ) -> Iterator[Fact]:
         userdata = self._userdata.get(path)
         if userdata is None:
-            userdata = self._userdata[path] = UserdataFacts(
-                CODECS, path, lambda out: self._tell(path, out)
-            )
+            userdata = self._userdata[path] = UserdataFacts(path, partial(self._tell, path))
         yield from userdata.changed(data, reached)
 
     def _around(self, node: TreeNode) -> Iterator[Fact]:

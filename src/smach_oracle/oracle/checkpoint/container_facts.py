@@ -18,7 +18,7 @@ from typing import (
 
 import smach
 from smach_common.foreign import ends_program, text_of, type_name
-from smach_oracle.store.codecs import Codecs, Encoded, NotStorable
+from smach_oracle.store.codecs import CODECS, Encoded, NotStorable
 from smach_oracle.store.names import (
     EXECUTION,
     HISTORY,
@@ -178,9 +178,9 @@ class UserdataFacts:
     that have run since.
     """
 
-    def __init__(self, codecs: Codecs, path: str, tell: Callable[[KeptOut], None]) -> None:
+    def __init__(self, path: str, tell: Callable[[KeptOut], None]) -> None:
         """`tell` gets each value that cannot be stored, when it is first seen."""
-        self._codecs, self._path, self._tell = codecs, path, tell
+        self._path, self._tell = path, tell
         self._known: Dict[str, _Known] = {}
 
     def changed(self, data: Dict[str, object], reached: Optional[FrozenSet[str]]) -> Iterator[Fact]:
@@ -215,7 +215,7 @@ class UserdataFacts:
         try:
             if told != text_of(key):
                 raise NotStorable('its name is no text in UTF-8')
-            encoded = self._codecs.encode(value, dropped.append)
+            encoded = CODECS.encode(value, dropped.append)
         except NotStorable as err:
             yield from self._keep_out(key, value, str(err), before)
             return

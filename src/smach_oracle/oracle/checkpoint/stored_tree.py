@@ -18,7 +18,7 @@ from typing import (
 )
 
 from smach_oracle.store import names
-from smach_oracle.store.codecs import Codecs, NotReadable
+from smach_oracle.store.codecs import CODECS, NotReadable
 from smach_oracle.store.errors import StoreDamaged
 from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredFact, StoredValue
@@ -154,7 +154,6 @@ class StoredTree(NamedTuple):
 def read_tree(
     store: StoreFile,
     trial: int,
-    codecs: Codecs,
     until: Optional[int] = None,
     renaming: Optional[Renaming] = None,
 ) -> StoredTree:
@@ -165,7 +164,7 @@ def read_tree(
     :raises StoreDamaged: where the store cannot be read.
     """
     facts = store.facts(trial, until)
-    return _Reading(store, codecs).read(facts if renaming is None else map(renaming, facts))
+    return _Reading(store).read(facts if renaming is None else map(renaming, facts))
 
 
 # moments of a state that has failed: what is new then, its preconditions have written
@@ -177,8 +176,8 @@ _AFTER_FAILURE = frozenset(
 class _Reading:
     """One pass over the facts of a trial."""
 
-    def __init__(self, store: StoreFile, codecs: Codecs) -> None:
-        self._store, self._codecs = store, codecs
+    def __init__(self, store: StoreFile) -> None:
+        self._store = store
         self._tree = StoredTree({}, {})
         self._keys: Dict[str, _Values] = {}  # by path
         self._at_entry: Dict[str, Dict[str, _Values]] = {}  # by path and label
@@ -299,7 +298,7 @@ class _Reading:
         """Return a value, the same object where a container hands it to those below."""
         known = self._decoded
         if (key, value) not in known:
-            known[key, value] = self._codecs.decode(value.text, value.whole, self._store.part)
+            known[key, value] = CODECS.decode(value.text, value.whole, self._store.part)
         return known[key, value]
 
 

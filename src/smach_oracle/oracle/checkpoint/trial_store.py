@@ -8,7 +8,6 @@ from functools import partial
 from typing import Callable, Iterator, List, Optional, Set, Tuple, TypeVar
 
 import smach
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.errors import StoreDamaged, StoreError
 from smach_oracle.store.holding import MachineLock
 from smach_oracle.store.names import BROKEN, ENDED, GOAL, KEPT, RENAMED, STRUCTURE
@@ -113,7 +112,7 @@ class TrialStore:
                 )
             )
             return None
-        tree = read_tree(self._store, last.number, CODECS)
+        tree = read_tree(self._store, last.number)
         top = tree.container(self._top.key)
         word, path = self._top.settings.on_resume
         earlier = self._earlier_moment(last)
@@ -202,11 +201,11 @@ class TrialStore:
             if name.startswith(GOAL) or name in ('questions', 'paused')
         }
         if earlier:
-            tree = read_tree(self._store, trial.number, CODECS, earlier)
+            tree = read_tree(self._store, trial.number, earlier)
         names = self._top.settings.resume_map
         changed = changed_script(self._top.name, names, self._store, trial, tree, self._structure)
         if changed.renaming is not None:
-            tree = read_tree(self._store, trial.number, CODECS, earlier or None, changed.renaming)
+            tree = read_tree(self._store, trial.number, earlier or None, changed.renaming)
         marks = marks_now(
             latest, tree, same_place if changed.renaming is None else changed.renaming.state
         )

@@ -12,7 +12,6 @@ from left_stores import Left
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
 
@@ -123,7 +122,7 @@ def test_equal_values_of_two_keys_do_not_become_one_object(tmp_path):
     killed = KilledMachine(make(tmp_path / 'killed'), two_lists)
     assert killed.run(kill_at=3) is None  # as ADDS begins
     killed.run(kill_at=0)
-    seen = read_tree(StoreFile(killed.store, read_only=True), 1, CODECS)
+    seen = read_tree(StoreFile(killed.store, read_only=True), 1)
     assert seen.container('TOP').keys['done'][:2] == ['C', 'ADDS']
     assert seen.container('TOP').keys['other'] == ['C']
 
@@ -340,7 +339,7 @@ def test_a_container_that_comes_under_way_is_stored_once_the_machine_is_wrapped_
     OracleContainer.wrap(top, name='TOP', settings={'checkpoint': path})
     assert top.execute() == 'done'
     with contextlib.closing(StoreFile(path, read_only=True)) as store:
-        grown = read_tree(store, 1, CODECS).container('TOP/KITCHEN/IN')
+        grown = read_tree(store, 1).container('TOP/KITCHEN/IN')
     assert (grown.execution, grown.at) == (1, ['done', 'ended'])
 
 
@@ -359,4 +358,4 @@ def test_of_a_machine_that_has_ended_all_userdata_are_stored_as_they_were_then(t
     OracleContainer.wrap(machine, name='TOP', settings={'checkpoint': path})
     assert machine.execute() == 'done'
     with contextlib.closing(StoreFile(path, read_only=True)) as store:
-        assert read_tree(store, 1, CODECS).container('TOP').keys['notes'] == ['before', 'changed']
+        assert read_tree(store, 1).container('TOP').keys['notes'] == ['before', 'changed']

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import pytest
 
 from smach_oracle.oracle.checkpoint.container_facts import UserdataFacts, WeakIds
-from smach_oracle.store.codecs import CODECS
 
 
 @pytest.mark.parametrize(
@@ -22,13 +21,13 @@ from smach_oracle.store.codecs import CODECS
     ],
 )
 def test_data_that_look_alike_are_told_apart(before, after):
-    facts = UserdataFacts(CODECS, 'TOP', lambda kept: None)
+    facts = UserdataFacts('TOP', lambda kept: None)
     assert len(list(facts.changed({'x': before()}, None))) == 1
     assert len(list(facts.changed({'x': after()}, None))) == 1
 
 
 def test_data_that_are_equal_are_not_stored_again():
-    facts = UserdataFacts(CODECS, 'TOP', lambda kept: None)
+    facts = UserdataFacts('TOP', lambda kept: None)
     for number in (1, 0, 0):
         data = {'x': [bytes(2), {'y': [1, 'text']}], 'z': 'text'}
         assert len(list(facts.changed(data, None))) == number * 2
@@ -43,7 +42,7 @@ def test_each_attribute_that_is_not_stored_is_named_once():
     one, other = Cup(1), Cup(2)
     one.owner = other.owner = other.colour = 'red'
     told = []
-    list(UserdataFacts(CODECS, 'TOP', told.append).changed({'cups': [one, other]}, None))
+    list(UserdataFacts('TOP', told.append).changed({'cups': [one, other]}, None))
     assert [each.attributes for each in told] == [('colour', 'owner')]
 
 

@@ -17,7 +17,6 @@ from smach_oracle.oracle.checkpoint.container_facts import ContainerFacts
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.recovery import options
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.renaming import Renaming
 from smach_oracle.store.rows import StoredFact, StoredValue
 from smach_oracle.store.store_file import StoreFile
@@ -209,7 +208,7 @@ def test_a_way_that_ctrl_c_ends_is_stored_as_one_of_which_nobody_knows(tmp_path)
     with pytest.raises(KeyboardInterrupt):
         machine.execute()
     with contextlib.closing(StoreFile(path, read_only=True)) as store:
-        stored = read_tree(store, 1, CODECS).container('TOP')
+        stored = read_tree(store, 1).container('TOP')
     assert [row.split()[3] for row in stored.ways['A']['ways']['results']] == ['-']
 
 
