@@ -4,8 +4,7 @@ import contextlib
 import os
 import sqlite3
 import time
-from functools import partial
-from typing import Callable, Iterator, List, Optional, Set, Tuple, TypeVar
+from typing import Iterator, List, Optional, Set, Tuple
 
 import smach
 from smach_oracle.store.errors import StoreDamaged, StoreError
@@ -59,7 +58,6 @@ def understood(path: str) -> Iterator[None]:
 # what may be resumed: the program was stopped, and the task was not done
 _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
-_Read = TypeVar('_Read')
 BEGINS_ANEW = '{}: the stored trial of {} is over, and a new one begins: {}'
 NO_ORACLE = (
     '{}: the trial of {} was stopped, and only an oracle goes on with the state that ran then '
@@ -99,7 +97,8 @@ class TrialStore:
         :raises CheckpointError: where the store cannot be read or written.
         :raises SettingsError: for a moment to go on from that is none of the trial.
         """
-        return self._or_let_go(self._to_resume)
+        with self._or_let_go():
+            return self._to_resume()
 
     def _to_resume(self) -> Optional[Resumption]:
         trials = self._store.trials(self._top.name)
@@ -237,7 +236,8 @@ class TrialStore:
         top, settings = self._top, self._top.settings
         _tell_what_begins_anew(top)
         if resumed is not None:
-            self._or_let_go(partial(go_on, top, resumed))
+            with self._or_let_go():
+                go_on(top, resumed)
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
         self._writer = StoreWriter(
             self._store,
@@ -270,11 +270,12 @@ class TrialStore:
             fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)]),
         ]
 
-    def _or_let_go(self, read: Callable[[], _Read]) -> _Read:
-        """Return what is read of the store. Let go of it where that fails."""
+    @contextlib.contextmanager
+    def _or_let_go(self) -> Iterator[None]:
+        """Let go of the store where the body cannot read it, or fails otherwise."""
         try:
             with understood(self._store.path):
-                return read()
+                yield
         except (StoreError, sqlite3.Error) as err:
             self._let_go()
             raise _refused(err, self._top) from err
