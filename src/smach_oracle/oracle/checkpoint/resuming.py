@@ -1,7 +1,7 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
 
 import time
-from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple, cast
+from typing import List, NamedTuple, Optional, Sequence, Tuple, cast
 
 import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
@@ -25,6 +25,7 @@ from ..smach_private import data_of, initial_label_of, set_current_label, states
 from .checkpointer import SEQ_RESERVE, must_stop
 from .stored_marks import Marks
 from .stored_tree import StoredContainer, StoredTree
+from .structure import ChangedScript
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
 GONE = 'the program was stopped at {}, which is not there any more'
@@ -39,12 +40,10 @@ class Resumption(NamedTuple):
     seq: int  # of the last event that is stored
     at: float  # s since the epoch, when that was
     asks: bool  # a person is asked before anything moves
-    changes: List[str]  # how the script differs from the one that was stopped
+    script: ChangedScript  # how the script differs from the one that was stopped
     marks: Marks  # of the states that have begun
     is_in_doubt: bool  # whether states may have run that are not stored
     is_earlier: bool  # whether later moments of the trial are stored
-    renamed: Mapping[str, str]  # paths of states by those that they had
-    structure: str  # id of that which was stopped
     rule: Optional[FailureRule]  # by which its failures were told, None: not known
     begins_at: str = ''  # path of a state to which it is sent, '': it goes on where it was
 
@@ -71,9 +70,9 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
                 top.path, rule, resumption.rule
             )
         )
-    for change in resumption.changes:
+    for change in resumption.script.changes:
         smach.logwarn('{}: the script has changed: {}'.format(top.path, change))
-    for old, new in resumption.renamed.items():
+    for old, new in resumption.script.names.items():
         smach.logwarn('{}: goes on with {} as {}'.format(top.path, old, new))
     if top.tree.control.paused:
         smach.logwarn('{}: is paused, as before its program was stopped'.format(top.path))
@@ -84,7 +83,7 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
             LAST_SEQ: resumption.seq,
             'moment': resumption.moment,
             'stopped_s': round(resumption.age_s, 3),
-            'changes': resumption.changes,
+            'changes': resumption.script.changes,
             RULE: rule.as_data(),
         },
     )
@@ -258,10 +257,10 @@ def _jump_path_named(top: TreeNode, path: str) -> JumpPath:
         raise _names_no_state('on_resume', 'state:' + path, top)
     return way
 
+
 def _names_no_state(setting: str, value: str, top: TreeNode) -> SettingsError:
     allowed = 'the label of a state of {}, or the path of one below it'.format(top.path)
     return SettingsError(GROUPS.key_of(setting), value, allowed)
-
 
 
 class _Setting:
@@ -464,6 +463,7 @@ def _is_wrapped_through(state: object) -> bool:
 
 def _why(resumption: Resumption) -> str:
     told = 'the program was stopped {:.0f} s ago'.format(resumption.age_s)
-    if resumption.changes:
-        told += ', and the script has changed since: ' + '; '.join(resumption.changes)
+    changes = resumption.script.changes
+    if changes:
+        told += ', and the script has changed since: ' + '; '.join(changes)
     return told

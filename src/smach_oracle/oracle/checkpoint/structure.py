@@ -196,7 +196,6 @@ class ChangedScript(NamedTuple):
 
 
 def changed_script(
-    name: str,
     names: Mapping[str, str],
     store: StoreFile,
     trial: StoredTrial,
@@ -205,13 +204,12 @@ def changed_script(
 ) -> ChangedScript:
     """Return how a script differs from the one of a stored trial.
 
-    :param name: that of the machine.
     :param names: the setting `resume_map`.
     :raises SettingsError: where `resume_map` names a state that was not there, or is not.
     """
     before = str(tree.whole.get(STRUCTURE) or trial.structure)
     if before == now.id:
-        _name_unknown(name, names, store, now)
+        _name_unknown(trial.machine, names, store, now)
         return ChangedScript(before, [], {}, None)
     described = store.description(before)
     changes = differences(described, now.description)
@@ -222,7 +220,7 @@ def changed_script(
         _check(old, old, known, 'a state of the machine that was stopped')
         _check(old, new, present, 'a state of the machine')
     return ChangedScript(
-        before, changes, names, Renaming(name, names, renaming.containers_of(described))
+        before, changes, names, Renaming(trial.machine, names, renaming.containers_of(described))
     )
 
 

@@ -140,7 +140,7 @@ class TrialStore:
         if not self._top.tree.recover and word != STATE:
             raise CheckpointError(NO_ORACLE.format(self._top.path, self._store.path))
         resumed = self._resumption(last, tree, moments, earlier)
-        if resumed.renamed:
+        if resumed.script.names:
             self._store.keep_structure(self._structure)
         return resumed if earlier else resumed._replace(begins_at=path)
 
@@ -202,12 +202,11 @@ class TrialStore:
         if earlier:
             tree = read_tree(self._store, trial.number, earlier)
         names = self._top.settings.resume_map
-        changed = changed_script(self._top.name, names, self._store, trial, tree, self._structure)
-        if changed.renaming is not None:
-            tree = read_tree(self._store, trial.number, earlier or None, changed.renaming)
-        marks = marks_now(
-            latest, tree, same_place if changed.renaming is None else changed.renaming.state
-        )
+        script = changed_script(names, self._store, trial, tree, self._structure)
+        renaming = script.renaming
+        if renaming is not None:
+            tree = read_tree(self._store, trial.number, earlier or None, renaming)
+        marks = marks_now(latest, tree, same_place if renaming is None else renaming.state)
         tree.whole.update(kept)
         return Resumption(
             trial,
@@ -217,13 +216,11 @@ class TrialStore:
             moments[-1].at,
             self._top.settings.on_resume[0] == ASK
             or in_doubt
-            or bool(changed.changes and changed.renaming is None),
-            changed.changes,
-            marks=marks,
+            or bool(script.changes and renaming is None),
+            script,
+            marks,
             is_in_doubt=in_doubt,
             is_earlier=bool(earlier),
-            renamed=changed.names,
-            structure=changed.before,
             rule=rule_in(tree.whole) or (FORMER_RULE if tree.containers else None),
         )
 
@@ -262,12 +259,12 @@ class TrialStore:
         One that goes on may do so by another rule of failures, and with other names of states.
         """
         rule = fact_of('', RULE, self._top.in_force.rule.as_data())
-        if resumed is None or not resumed.renamed:
+        if resumed is None or not resumed.script.names:
             return [rule]
         return [
             rule,
             fact_of('', STRUCTURE, self._structure.id),
-            fact_of('', RENAMED, [resumed.structure, dict(resumed.renamed)]),
+            fact_of('', RENAMED, [resumed.script.before, dict(resumed.script.names)]),
         ]
 
     @contextlib.contextmanager
