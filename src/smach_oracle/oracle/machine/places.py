@@ -332,15 +332,6 @@ def why_closed_on(way: JumpPath) -> str:
     return ''
 
 
-def closed_in_words(way: JumpPath, why: str, name: str) -> str:
-    """Say that a place of this name, or one on the way down, is closed.
-
-    It is a clause. `why`: as `why_closed_on` has it.
-    """
-    # of what lies on the way down it names the path
-    return why if why.startswith(way.meeting_node.path) else '{} {}'.format(name, why)
-
-
 def repeated_on(way: JumpPath) -> Tuple[str, ...]:
     """Return the guarded states that may be repeated if the machine goes to a place."""
     return repeated_by_going_to(way.meeting_node, way.first_label)

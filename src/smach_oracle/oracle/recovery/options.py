@@ -25,7 +25,6 @@ from ..machine.nesting import records_of
 from ..machine.places import (
     JumpPath,
     TreePlace,
-    closed_in_words,
     direct_levels,
     jump_path_to,
     name_of,
@@ -161,7 +160,10 @@ def _why_blocked(recovery: Recovery, each: OpenWay, why_not_above: WhyNotAbove) 
 def why_closed(recovery: Recovery, option: Option) -> str:
     """Say that a place, or one on the way down, is closed, or '' where it is not."""
     way, closed = option.jump_path, option.closed
-    return closed and closed_in_words(way, closed, named(recovery, way))
+    # of what lies on the way down it names the path
+    if not closed or closed.startswith(way.meeting_node.path):
+        return closed
+    return '{} {}'.format(named(recovery, way), closed)
 
 
 def why_repeats(recovery: Recovery, option: Option) -> str:
