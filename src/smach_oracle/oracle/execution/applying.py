@@ -159,10 +159,10 @@ class Applying:
                 missing = missing_keys(self._machine, target, data_of(self._machine.userdata))
             data = {'missing_keys': list(missing), 'userdata': userdata, **(across or {})}
             node.emit(EventKind.JUMP, label, target=target, by=by, text=text, data=data)
-            node.records.count_oracle_edge(target)
+            node.records.oracle_edges[target] += 1
         go_to(node, message_of(node.settings.oracle_label, target, target), target)
 
     def _terminate(self, outcome: str) -> str:
         """Leave the meta state for a container outcome."""
-        self._node.records.count_oracle_edge(outcome)
+        self._node.records.oracle_edges[outcome] += 1
         return terminate(self._node, self._node.settings.oracle_label, outcome, outcome)

@@ -1,7 +1,7 @@
 """What is kept of one container: the settings in force, its records and history."""
 
 import copy
-from typing import Any, Dict, Mapping, Optional, Tuple
+from typing import Any, Counter, Dict, Mapping, Optional, Tuple
 
 from ..decision.failure_rate import base_of
 from ..decision.policies import policy_named
@@ -92,7 +92,7 @@ class ContainerRecords:
         # before a stop that was obeyed, each with the snapshot of its latest entry
         self._work: Optional[Tuple[Tuple[StateRecord, Optional[Dict[str, object]]], ...]] = None
         self._is_drawn = False  # the next state is what the author drew after `preempted`
-        self.oracle_edges: Dict[str, int] = {}  # how often ORACLE led to a state or outcome
+        self.oracle_edges: Counter[str] = Counter()  # how often ORACLE led to a state or outcome
         # what a rates file says of states that are not there yet
         self.to_come: Dict[str, Dict[str, object]] = {}
 
@@ -223,10 +223,6 @@ class ContainerRecords:
         visit = Visit(record.label, outcome, VisitResult.SUCCESS)
         record.fast[outcome] = FastEdge(target, drawn, message, visit)
 
-    def count_oracle_edge(self, target: str) -> None:
-        """Count a way out of the meta state."""
-        self.oracle_edges[target] = self.oracle_edges.get(target, 0) + 1
-
     def note_failure(self, record: StateRecord) -> None:
         """Note in the history that a state has failed, before its visit is added."""
         self.history.failed(record.label, record.totals[0])
@@ -246,6 +242,6 @@ class ContainerRecords:
         """Return records for a shallow copy of the machine, which learns on its own."""
         twin = ContainerRecords(copy.deepcopy(self.history))
         twin.by_label = copy.deepcopy(self.by_label.copy())
-        twin.oracle_edges = dict(self.oracle_edges)
+        twin.oracle_edges = self.oracle_edges.copy()
         twin.to_come = dict(self.to_come)
         return twin
