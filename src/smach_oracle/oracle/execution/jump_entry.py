@@ -85,7 +85,7 @@ def keep_start(node: TreeNode) -> None:
     Concurrences and Iterators have no userdata of their own.
     """
     node.tree.restarts.keep(
-        {id(each): each.snapshot() for each in nodes_of(node.machine) if each.site.is_container}
+        {each: each.snapshot() for each in nodes_of(node.machine) if each.site.is_container}
     )
 
 
@@ -94,7 +94,7 @@ def start_over(node: TreeNode, target: str) -> None:
     restarts = node.tree.restarts
     restarts.count += 1
     for each in nodes_of(node.machine):
-        userdata = restarts.userdata_of(each)
+        userdata = restarts.userdata.get(each)
         if userdata is not None:
             restore(data_of(each.machine.userdata), userdata, (), each.in_force.deep_copy_keys)
     leave_for(node, target)

@@ -87,7 +87,7 @@ class Restarts:
     """The restarts of one trial of a tree.
 
     `count`: how often its top machine was started over. `is_due`: whether the userdata of the start
-    is wanted, and not kept yet.
+    is wanted, and not kept yet. `userdata`: that with which containers have begun, by node.
     """
 
     def __init__(self) -> None:
@@ -97,13 +97,9 @@ class Restarts:
         """Forget the trial before. `is_wanted`: whether a policy may start this one over."""
         self.count = 0
         self.is_due = is_wanted
-        self._userdata: Mapping[int, Dict[str, object]] = {}
+        self.userdata: Mapping[object, Dict[str, object]] = {}
 
-    def keep(self, userdata: Mapping[int, Dict[str, object]]) -> None:
-        """Keep snapshots of the userdata of the start, by the id of the node."""
+    def keep(self, userdata: Mapping[object, Dict[str, object]]) -> None:
+        """Keep snapshots of the userdata of the start."""
         self.is_due = False
-        self._userdata = userdata
-
-    def userdata_of(self, node: object) -> Optional[Dict[str, object]]:
-        """Return the userdata with which a container has begun, None where it is not known."""
-        return self._userdata.get(id(node))
+        self.userdata = userdata
