@@ -66,7 +66,6 @@ class Branch(smach.Container):
     def _be_idle(self) -> None:
         self._is_running = False
         self._set_current_state(None)
-        self._preempted_label: Optional[str] = None
         self._preempted_state: Optional[smach.State] = None
 
     def take(self, container: smach.Container, state: smach.State) -> None:
@@ -235,7 +234,7 @@ class Branch(smach.Container):
             return
         if asked is not None:
             asked.recall_preempt()
-        self._preempted_label, self._preempted_state = self._current_label, state
+        self._preempted_state = state
         self._is_preempt_passed_on = True
         try:
             state.request_preempt()
