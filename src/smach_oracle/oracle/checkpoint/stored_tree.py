@@ -2,6 +2,8 @@
 
 import json
 from dataclasses import dataclass, field
+from itertools import groupby
+from operator import attrgetter
 from typing import (
     Dict,
     Iterable,
@@ -185,15 +187,11 @@ class _Reading:
         self._decoded: Dict[Tuple[str, StoredValue], object] = {}  # by userdata key
 
     def read(self, facts: Iterable[StoredFact]) -> StoredTree:
-        before: Optional[StoredFact] = None
-        for fact in facts:
-            if before is not None and before.moment != fact.moment:
-                self._note_entry(before)
-            before = fact
-            if fact.name:
-                self._take(fact)
-        if before is not None:
-            self._note_entry(before)
+        for _, moment in groupby(facts, attrgetter('moment')):
+            for fact in moment:
+                if fact.name:
+                    self._take(fact)
+            self._note_entry(fact)
         for path, container in self._tree.containers.items():
             self._put_together(path, container)
         return self._tree
