@@ -28,15 +28,12 @@ class IteratorWrapper(ContainerWrapper):
         self._given: Dict[str, object] = {}  # its io keys when it began
         self.at_item: Optional[Dict[str, object]] = None  # its userdata as the item under way began
         self._ended_with: Optional[str] = None  # None: an error, or it was left
-        self._is_asked_to_go_on = False
+        # the next execution goes on where the one before has stopped, else it begins again
+        self.is_asked_to_go_on = False
         self.goes_on = False
         self.is_left = False  # for a place elsewhere. `execution.departure` sets it
 
     # -- going on
-
-    def ask_to_go_on(self, go_on: bool) -> None:
-        """Let the next execution go on where the one before has stopped, or begin again."""
-        self._is_asked_to_go_on = go_on
 
     def has_stopped_early(self, node: TreeNode, label: str) -> bool:
         """Whether it has failed or was left, when it was executed last."""
@@ -62,8 +59,8 @@ class IteratorWrapper(ContainerWrapper):
             self._trial_id,
             self._inside,
         )
-        self.goes_on = items.goes_on = self._is_asked_to_go_on and has_items_left
-        self._is_asked_to_go_on = False
+        self.goes_on = items.goes_on = self.is_asked_to_go_on and has_items_left
+        self.is_asked_to_go_on = False
         if has_items_left and self._ended_with is None and not self.goes_on:
             items.tell_of_repeats()
         resumed = self._to_resume()
@@ -105,7 +102,7 @@ class IteratorWrapper(ContainerWrapper):
         for _, state in self.states():
             inner = wrapper_of(state)
             if isinstance(inner, IteratorWrapper):
-                inner.ask_to_go_on(True)
+                inner.is_asked_to_go_on = True
 
     def _tell(self, text: str) -> None:
         self.parent.warn(text, '/'.join(self.labels_from_parent))
@@ -203,4 +200,5 @@ def ask_to_go_on(node: TreeNode, target: str) -> None:
     for label, state in containers_of(node.machine):
         wrapper = wrapper_of(state)
         if isinstance(wrapper, IteratorWrapper):
-            wrapper.ask_to_go_on(label == target and wrapper.has_stopped_early(node, label))
+            goes_there = label == target
+            wrapper.is_asked_to_go_on = goes_there and wrapper.has_stopped_early(node, label)
