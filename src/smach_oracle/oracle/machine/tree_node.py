@@ -182,8 +182,7 @@ class TreeNode:
 
     def wraps(self, below: Labels) -> bool:
         """Whether what these labels below this container lead to has an oracle of its own."""
-        above = self.relative_path
-        return is_nested_at(self.in_force.nested, '/'.join(((above,) if above else ()) + below))
+        return is_nested_at(self.in_force.nested, '/'.join(self._labels_from_top()[0] + below))
 
     # -- settings and states
 
