@@ -1,10 +1,9 @@
 """Carries out a verdict: the one place that moves a machine from the meta state."""
 
-from typing import Mapping, Optional, Sequence
+from typing import Dict, Optional
 
 from ..machine.repeats import note_superseded
 from ..machine.site import route_of
-from ..machine.userdata import missing_keys
 from ..records.events import EventKind
 from ..records.facts import JUMPED_FROM, JUMPED_TO
 from ..records.visits import VisitResult
@@ -21,8 +20,7 @@ from ..recovery.verdict import (
     arrives_at,
     leaving_outcome,
 )
-from ..smach_private import data_of
-from .jump_entry import prepare_entry, start_over
+from .jump_entry import plain_entry, prepare_entry, start_over
 from .transitions import be_back, go_to, message_of, obey_preempt, stop_left_behind, terminate
 
 
@@ -79,20 +77,21 @@ class Applying:
             jump.chosen.note()
         elif jump.asked is not None:
             jump.asked.go()
+        target = way.first_label
         if jump.restarts:  # with the userdata of the start in all containers
-            start_over(node, way.first_label)
-            userdata, missing = 'start', None
+            told = start_over(node, target)
         else:
-            entry = prepare_entry(way, jump.written, 'jumping')
-            userdata, missing = entry.userdata, entry.missing
-        self._note_entry(way.first_label)
+            told = prepare_entry(way, jump.written, 'jumping')
+        self._note_entry(target)
         lower = self._occasion.departure
-        told = {  # of a jump by a way of the menu, or across containers
-            **({} if jump.chosen is None else {'way': jump.chosen.gone.way}),
-            **({} if lower is None else {JUMPED_FROM: lower.failed_path}),
-            **({JUMPED_TO: way.entered_places[-1].path} if len(way.entered_places) > 1 else {}),
-        }
-        self._go_on(way.first_label, jump.by, jump.text, userdata, missing, told)
+        # of a jump by a way of the menu, or across containers
+        if jump.chosen is not None:
+            told['way'] = jump.chosen.gone.way
+        if lower is not None:
+            told[JUMPED_FROM] = lower.failed_path
+        if len(way.entered_places) > 1:
+            told[JUMPED_TO] = way.entered_places[-1].path
+        self._go_on(target, jump.by, jump.text, told)
 
     def _supersede(self, verdict: Supersede) -> Optional[str]:
         route = route_of(self._machine, self._record.label, verdict.outcome)
@@ -143,21 +142,13 @@ class Applying:
         self._machine.service_preempt()
 
     def _go_on(
-        self,
-        target: str,
-        by: str = '',
-        text: str = '',
-        userdata: str = 'keep',
-        missing: Optional[Sequence[str]] = None,
-        across: Optional[Mapping[str, str]] = None,
+        self, target: str, by: str = '', text: str = '', told: Optional[Dict[str, object]] = None
     ) -> None:
-        """Leave the meta state for a state."""
+        """Leave the meta state for a state. `told`: of its entry. None: nothing was done for it."""
         node, label = self._node, self._record.label
         again = self._occasion.first_step is FirstStep.ENTER_AGAIN and target == label
         if by or not again:
-            if missing is None:
-                missing = missing_keys(self._machine, target, data_of(self._machine.userdata))
-            data = {'missing_keys': list(missing), 'userdata': userdata, **(across or {})}
+            data = told or plain_entry(node, target)
             node.emit(EventKind.JUMP, label, target=target, by=by, text=text, data=data)
             node.records.oracle_edges[target] += 1
         go_to(node, message_of(node.settings.oracle_label, target, target), target)

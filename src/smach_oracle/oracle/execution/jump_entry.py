@@ -4,7 +4,7 @@ An Iterator that has failed or was left goes on there with the item that was not
 that is started over has its userdata as it was at first, in all containers of the tree.
 """
 
-from typing import Collection, NamedTuple, Optional, Tuple, cast
+from typing import Collection, Dict, NamedTuple, Optional, Tuple, cast
 
 from ..asking.question import names
 from ..branches.iterator_wrapper import ask_to_go_on
@@ -23,26 +23,21 @@ from ..machine.places import (
 )
 from ..machine.repeats import leave_for, why_closed
 from ..machine.tree_node import TreeNode
-from ..machine.userdata import restore
+from ..machine.userdata import missing_keys, restore
 from ..records.events import EventKind
 from ..smach_private import current_label_of, data_of, is_executing, remapping_of
 from .transitions import go_to
 
 
-class JumpEntry(NamedTuple):
-    """The way in which a place is entered."""
-
-    missing: Tuple[str, ...]  # input keys that it does not find
-    userdata: str  # 'restore' or 'keep'
-
-
-def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEntry:
+def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> Dict[str, object]:
     """Put the userdata back where the settings say so, and note in which states containers begin.
 
     To be called in the thread of the container that holds the whole way, its lock held.
 
     :param written: its userdata keys that survive a restore.
     :param sent: what is done, for a warning.
+    :returns: what is told of the entry: the input keys that it does not find, and what was done
+        with the userdata.
     """
     node, target = way.meeting_node, way.first_label
     forget_resumed(node)
@@ -59,7 +54,13 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> JumpEnt
             '{} there without its input keys {}'.format(sent, ', '.join(missing)), place.label
         )
     node.record(target).go_down(way.entered_places[1:])
-    return JumpEntry(missing, KEEP if snapshot is None else RESTORE)
+    return {'missing_keys': list(missing), 'userdata': KEEP if snapshot is None else RESTORE}
+
+
+def plain_entry(node: TreeNode, label: str, userdata: str = KEEP) -> Dict[str, object]:
+    """Return what is told of an entry of a state with the userdata that are there."""
+    missing = missing_keys(node.machine, label, data_of(node.machine.userdata))
+    return {'missing_keys': list(missing), 'userdata': userdata}
 
 
 def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
@@ -89,8 +90,11 @@ def keep_start(node: TreeNode) -> None:
     )
 
 
-def start_over(node: TreeNode, target: str) -> None:
-    """Put the userdata of a machine, and of those in it, back to that of the start. Count it."""
+def start_over(node: TreeNode, target: str) -> Dict[str, object]:
+    """Put the userdata of a machine, and of those in it, back to that of the start. Count it.
+
+    :returns: what is told of the entry.
+    """
     restarts = node.tree.restarts
     restarts.count += 1
     for each in nodes_of(node.machine):
@@ -99,6 +103,7 @@ def start_over(node: TreeNode, target: str) -> None:
             restore(data_of(each.machine.userdata), userdata, (), each.in_force.deep_copy_keys)
     leave_for(node, target)
     ask_to_go_on(node, target)
+    return plain_entry(node, target, 'start')
 
 
 # -- sent by an operator, at a state boundary
@@ -164,10 +169,9 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     way = cast('JumpPath', way)
     settle_ways(node, None)
     node.record(label).forget_entry()  # it may have been led to, and is not entered
-    entry = prepare_entry(way, jump.written, 'sent')
+    data = prepare_entry(way, jump.written, 'sent')
     node.records.take_up_work()
     by = jump.by or 'an operator'
-    data = {'missing_keys': list(entry.missing), 'userdata': entry.userdata}
     if jump.container:
         data['to'] = way.entered_places[-1].path
     node.emit(
