@@ -12,6 +12,7 @@ from ..recovery.occasions import FirstStep, Superseding
 from ..recovery.phases import OracleState
 from ..recovery.recovery import Recovery
 from ..recovery.verdict import (
+    ContainerEnding,
     GiveUp,
     JumpTo,
     Preempted,
@@ -116,25 +117,25 @@ class Applying:
             node.execution.give_up()
         outcome, target = ending.outcome or '', ending.state or ''
         node.emit(EventKind.GIVE_UP, self._record.label, outcome, target, by=verdict.by, text=told)
-        if ending.error is not None:  # SMACH has logged it where it was made
-            raise ending.error
-        if ending.state is not None:
-            self._go_on(ending.state, verdict.by, text)
-            return None
-        return self._terminate(str(ending.outcome))
+        return self._end(ending, verdict.by, text)
 
     def _preempted(self, verdict: Preempted) -> Optional[str]:
         ending = verdict.ending
         if self._machine.preempt_requested():
             self._node.execution.tell_preempt()
-        if ending.state is not None:
-            if ending.obeys:  # the author's own transition: the request goes on with it
-                obey_preempt(self._node, self._meta)
-            self._go_on(ending.state)
-            return None
-        self._service_preempt()
-        if ending.error is not None:
+        if ending.obeys:  # the author's own transition: the request goes on with it
+            obey_preempt(self._node, self._meta)
+        elif ending.state is None:
+            self._service_preempt()
+        return self._end(ending)
+
+    def _end(self, ending: ContainerEnding, by: str = '', text: str = '') -> Optional[str]:
+        """End the container, or go on, as an ending says."""
+        if ending.error is not None:  # SMACH has logged it where it was made
             raise ending.error
+        if ending.state is not None:
+            self._go_on(ending.state, by, text)
+            return None
         return self._terminate(str(ending.outcome))
 
     def _service_preempt(self) -> None:
