@@ -206,10 +206,8 @@ class Step:
         if stopping:
             recall_preempts(states_of(self._machine)[failure.state])  # it services none
             return self._end_preempted(failure)
-        if node.tree.is_resumed:  # nobody has said whether it was done before the program stopped
-            before = Unfinished(failure.kind, '', failure.text, failure.text)
-            return occasions.interrupted(failure, self._context(), before)
-        return occasions.failed(failure, self._context())
+        # if resumed, nobody has said whether it was done before the program stopped
+        return occasions.failed(failure, self._context())._replace(keeps=node.tree.is_resumed)
 
     def _unfinished(self, failure: Failure, before: Unfinished) -> Union[Occasion, Stop]:
         """Go on with a visit that was begun before the program was stopped.
