@@ -116,43 +116,52 @@ class ContainerRun(Execution):
             if self._is_trial:
                 _running.remove(node)
                 if not node.tree.is_parents():
-                    _end_trial(node, self.outcome, error, self._store)
+                    self._end_trial(error)
             elif self.outcome is None:
                 self.outcome = outcome_of_early_end(node)
 
-
-def _end_trial(
-    node: TreeNode,
-    outcome: Optional[str],
-    error: Optional[BaseException],
-    store: Optional[TrialStore],
-) -> None:
-    node.tree.control.end_trial()
-    node.tree.workers.end_idle_threads()
-    node.tree.alarms.rest()
-    why = _trial_end(node, outcome, error)
-    if why is TrialEnd.OUTCOME:
-        node.tree.budget.end()
-    if why is TrialEnd.KEPT:
-        node.machine.service_preempt()
-        for state in states_of(node.machine).values():
-            recall_preempts(state)
-    if node.tree.budget.is_spent_from:  # else it has gone no way
-        is_lost = why is TrialEnd.ERROR or (
-            why is TrialEnd.OUTCOME and outcome in node.in_force.failing
+    def _end_trial(self, error: Optional[BaseException]) -> None:
+        node, outcome, store = self._node, self.outcome, self._store
+        node.tree.control.end_trial()
+        node.tree.workers.end_idle_threads()
+        node.tree.alarms.rest()
+        why = self._why_over(error)
+        if why is TrialEnd.OUTCOME:
+            node.tree.budget.end()
+        if why is TrialEnd.KEPT:
+            node.machine.service_preempt()
+            for state in states_of(node.machine).values():
+                recall_preempts(state)
+        if node.tree.budget.is_spent_from:  # else it has gone no way
+            is_lost = why is TrialEnd.ERROR or (
+                why is TrialEnd.OUTCOME and outcome in node.in_force.failing
+            )
+            settle_ways(node, False if is_lost and not node.execution.was_preempted else None)
+        with_rates = bool(node.settings.rates_file)
+        learned = {'learned': learned_by(nodes_of(node.machine))} if with_rates else {}
+        node.emit(
+            EventKind.TRIAL_END,
+            outcome=outcome or '',
+            text=why_no_outcome(outcome, error),
+            data={ENDED_BY: why.value, **learned},
         )
-        settle_ways(node, False if is_lost and not node.execution.was_preempted else None)
-    with_rates = bool(node.settings.rates_file)
-    learned = {'learned': learned_by(nodes_of(node.machine))} if with_rates else {}
-    node.emit(
-        EventKind.TRIAL_END,
-        outcome=outcome or '',
-        text=why_no_outcome(outcome, error),
-        data={ENDED_BY: why.value, **learned},
-    )
-    save_rates(node)
-    if store is not None:
-        store.end(why, outcome or '', time.time())
+        save_rates(node)
+        if store is not None:
+            store.end(why, outcome or '', time.time())
+
+    def _why_over(self, error: Optional[BaseException]) -> TrialEnd:
+        node = self._node
+        if ends_program(error):
+            return TrialEnd.STOPPED
+        if node.tree.early_end.why is not None:
+            return node.tree.early_end.why
+        if error is not None:
+            return TrialEnd.ERROR
+        if self.outcome is not None:
+            return TrialEnd.OUTCOME
+        if node.engine.stepped or smach.is_shutdown():  # it may come before the first state
+            return TrialEnd.SHUTDOWN
+        return TrialEnd.INCONSISTENT
 
 
 def _settings(node: TreeNode) -> Dict[str, object]:
@@ -166,20 +175,6 @@ def _settings(node: TreeNode) -> Dict[str, object]:
         **{'cost.' + name: value for name, value in costs.items()},
         **{name: getattr(defaults, name) for name in told},
     }
-
-
-def _trial_end(node: TreeNode, outcome: Optional[str], error: Optional[BaseException]) -> TrialEnd:
-    if ends_program(error):
-        return TrialEnd.STOPPED
-    if node.tree.early_end.why is not None:
-        return node.tree.early_end.why
-    if error is not None:
-        return TrialEnd.ERROR
-    if outcome is not None:
-        return TrialEnd.OUTCOME
-    if node.engine.stepped or smach.is_shutdown():  # it may come before the first state
-        return TrialEnd.SHUTDOWN
-    return TrialEnd.INCONSISTENT
 
 
 def _leave_to_parent() -> None:
