@@ -1,12 +1,12 @@
 """Checks that the settings of a wrapped machine fit its states."""
 
-from typing import Any, Iterator, List, Set, Tuple, cast
+from typing import Iterator, List, Set, Tuple, cast
 
 import smach
 
 from ..errors import SettingsError
-from ..machine.nesting import nodes_of, paths_below
-from ..machine.places import allowed_for, why_unfit
+from ..machine.nesting import paths_below
+from ..machine.places import allowed_for, places_of, why_unfit
 from ..machine.tree_node import TreeNode
 from ..settings.checks import STATE, flag
 from ..settings.names import UnfitKind, UnfitName, did_you_mean, matches
@@ -115,16 +115,15 @@ def _unfit_targets(top: TreeNode) -> Iterator[UnfitName]:
     verb, target = settings.on_no_answer
     named = []
     if verb == 'goto':
-        named.append((GROUPS.key_of('on_no_answer'), target, UnfitKind.CHECKED))
+        named.append((GROUPS.key_of('on_no_answer'), target))
     if settings.on_resume[0] == STATE:
-        named.append((GROUPS.key_of('on_resume'), settings.on_resume[1], UnfitKind.CHECKED))
-    named += [
-        ('{}.{}'.format(GROUPS.key_of('resume_map'), old), new, UnfitKind.CHECKED)
-        for old, new in settings.resume_map.items()
-    ]
-    for key, name, kind in named:
+        named.append((GROUPS.key_of('on_resume'), settings.on_resume[1]))
+    prefix = GROUPS.key_of('resume_map') + '.'
+    named += [(prefix + old, new) for old, new in settings.resume_map.items()]
+    for key, name in named:
         if name.strip('/') not in known:
-            yield _no_state(key, name, known, kind)._replace(name=name.strip('/'))
+            unfit = _no_state(key, name, known, UnfitKind.CHECKED)
+            yield unfit._replace(name=name.strip('/'))
 
 
 def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
@@ -152,12 +151,9 @@ def _unfit_outcomes(top: TreeNode) -> Iterator[UnfitName]:
 def _outcomes_of(top: TreeNode, name: str) -> Set[str]:
     """Return the outcomes of the states for which a name stands, and with `**` of the top."""
     found = set(top.machine.get_registered_outcomes()) if name == '**' else set()
-    for node in nodes_of(top.machine):
-        path = node.relative_path
-        for label in node.labels():
-            if matches(name, '{}/{}'.format(path, label) if path else label):
-                state: Any = states_of(node.machine)[label]
-                found.update(state.get_registered_outcomes())
+    for each in places_of(top):
+        if matches(name, each.relative_path):
+            found.update(states_of(each.node.machine)[each.label].get_registered_outcomes())
     return {each for each in found if isinstance(each, str)}
 
 
@@ -173,12 +169,7 @@ def _unfit(
 
 
 def _known_names(top: TreeNode) -> Set[str]:
-    known: Set[str] = set()
-    for node in nodes_of(top.machine):
-        path = node.relative_path
-        for label in node.labels():
-            known.update((label, '{}/{}'.format(path, label) if path else label))
-    return known
+    return {name for each in places_of(top) for name in (each.label, each.relative_path)}
 
 
 def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...]:

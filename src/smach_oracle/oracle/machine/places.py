@@ -153,15 +153,18 @@ class TreePlace(NamedTuple):
         """Return the path of the container, and the label."""
         return '{}/{}'.format(self.node.path, self.label)
 
+    @property
+    def relative_path(self) -> str:
+        """Return the same below the top machine."""
+        return '/'.join(filter(None, (self.node.relative_path, self.label)))
+
 
 def name_of(place: TreePlace, node: TreeNode) -> str:
     """Return a name of a place by which `place_named` finds it from a container.
 
     That is its label, or its path where it is in another container.
     """
-    if place.node is node:
-        return place.label
-    return '/'.join(('', *filter(None, (place.node.relative_path, place.label))))
+    return place.label if place.node is node else '/' + place.relative_path
 
 
 def places_of(node: TreeNode) -> Iterator[TreePlace]:
