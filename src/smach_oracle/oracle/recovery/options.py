@@ -39,6 +39,7 @@ from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
 from ..records.visits import Visit, VisitResult
 from ..settings.failing_outcomes import is_preempted
+from ..settings.preconditions import PreconditionKind
 from ..smach_private import initial_label_of, states_of, transitions_of
 from .recovery import Recovery
 from .verdict import Foreseen, streak_of
@@ -182,10 +183,10 @@ def function_that_runs(recovery: Recovery) -> str:
     """Return which function among the preconditions was left behind and runs, '' for none."""
     workers = recovery.node.tree.workers
     for spec in recovery.record.settings.preconditions:
-        for name, function in spec.functions():
-            why = workers.blocked(function)
+        for function in spec.of_kind(PreconditionKind.CALLABLE):
+            why = workers.blocked(function.target)
             if why:
-                return '{} {}'.format(name, why)
+                return '{} {}'.format(function.name, why)
     return ''
 
 

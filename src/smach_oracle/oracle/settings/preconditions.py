@@ -8,7 +8,7 @@ hold. In YAML: a label, a path (KITCHEN/LOOK, or /LOOK for a state of the top ma
 """
 
 from enum import Enum
-from typing import Any, Callable, List, Mapping, NamedTuple, Optional, Tuple
+from typing import Any, Iterator, List, Mapping, NamedTuple, Optional, Tuple
 
 from ..errors import SettingsError
 from ..identity import name_of
@@ -35,19 +35,15 @@ class PreconditionSpec(NamedTuple):
 
     def labels(self) -> Tuple[str, ...]:
         """Return the labels and paths of other states that it names."""
-        if self.kind is PreconditionKind.LABEL:
-            return (self.target,)
-        if self.kind is PreconditionKind.PAIR:
-            return tuple(label for half in self.target for label in half.labels())
-        return ()
+        return tuple(each.target for each in self.of_kind(PreconditionKind.LABEL))
 
-    def functions(self) -> Tuple[Tuple[str, Callable[..., object]], ...]:
-        """Return the names of the functions that it calls, each with the function."""
-        if self.kind is PreconditionKind.CALLABLE:
-            return ((self.name, self.target),)
+    def of_kind(self, kind: PreconditionKind) -> Iterator['PreconditionSpec']:
+        """Yield itself if it is of this kind. Of a pair, yield the halves that are."""
         if self.kind is PreconditionKind.PAIR:
-            return tuple(found for half in self.target for found in half.functions())
-        return ()
+            for half in self.target:
+                yield from half.of_kind(kind)
+        elif self.kind is kind:
+            yield self
 
 
 _ALLOWED = (
