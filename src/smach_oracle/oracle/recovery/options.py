@@ -35,7 +35,6 @@ from ..machine.places import (
 )
 from ..machine.repeats import has_visited
 from ..machine.site import route_of
-from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
 from ..records.visits import Visit, VisitResult
 from ..settings.failing_outcomes import is_preempted
@@ -88,17 +87,6 @@ def option_on(recovery: Recovery, way: JumpPath) -> Option:
     ):  # that is to wait on
         return Option(way, '', ())
     return Option(way, why_closed_on(way), repeated_on(way))
-
-
-def menu_on(recovery: Recovery) -> Iterator[OpenWay]:
-    """Yield the ways of the menu, none of them blocked yet. A state that still runs has none."""
-    if recovery.failure.still_runs:
-        return
-    option: Optional[Option] = None
-    for way, jump_path in menu_of(recovery.node, recovery.record, visited_on(recovery)):
-        if option is None or option.jump_path is not jump_path:  # several enter the failed state
-            option = option_on(recovery, jump_path)
-        yield OpenWay(way, option)
 
 
 def visited_on(recovery: Recovery) -> Tuple[str, ...]:
@@ -275,26 +263,24 @@ def leading_to(
     return [each for each in found if each not in goals and each != around]
 
 
-def menu_of(
-    node: TreeNode, record: StateRecord, visited: Sequence[str]
-) -> Iterator[Tuple[Way, JumpPath]]:
-    """Yield the ways on from a failure of a state, and their jumps. None is blocked yet.
-
-    `visited`: the states before it, as `visited_before` returns them.
-    """
+def menu_on(recovery: Recovery) -> Iterator[OpenWay]:
+    """Yield the ways of the menu, none of them blocked yet. A state that still runs has none."""
+    if recovery.failure.still_runs:
+        return
+    node, record, visited = recovery.node, recovery.record, visited_on(recovery)
     visits = sum(each.visits for each in records_of(node))
     visit_min = node.tree.budget.work_time.now() / 60.0 / max(1, visits)
     here = record.label
+    again = option_on(recovery, JumpPath((), node, (TreePlace(node, here),)))
     way = Way(WayKind.AGAIN, here, userdata=node.in_force.userdata, minutes=visit_min)
-    again = JumpPath((), node, (TreePlace(node, here),))
-    yield way, again
+    yield OpenWay(way, again)
     for wait_s in WAITS_S:
         minutes = visit_min + wait_s / 60.0
-        yield Way(WayKind.WAIT, here, 0, wait_s, way.userdata, minutes), again
+        yield OpenWay(way._replace(kind=WayKind.WAIT, wait_s=wait_s, minutes=minutes), again)
     specs = record.settings.preconditions
     if specs:
         minutes = visit_min * (1 + len(specs))
-        yield Way(WayKind.PREPARE, here, userdata=way.userdata, minutes=minutes), again
+        yield OpenWay(way._replace(kind=WayKind.PREPARE, minutes=minutes), again)
     for kind, name, place in _goals(node, here, visited):
         jump_path = jump_path_to(node, place)
         if jump_path is not None:
@@ -308,7 +294,7 @@ def menu_of(
                 minutes=visit_min * (1 + len(entered)),
                 repeats=tuple(each for each, has_succeeded in entered if has_succeeded),
             )
-            yield back, jump_path
+            yield OpenWay(back, option_on(recovery, jump_path))
 
 
 def _goals(
