@@ -45,7 +45,6 @@ from .recovery import Recovery
 from .stop import preempt_beside
 from .verdict import (
     ContainerEnding,
-    Departure,
     Foreseen,
     GiveUp,
     JumpTo,
@@ -59,10 +58,13 @@ from .verdict import (
 
 def obey_given(recovery: Recovery) -> Optional[Verdict]:
     """Go as was decided before: by an answer, or in a container below."""
-    occasion = recovery.occasion
-    if occasion.answer is not None:
-        return _obey_answer(recovery, occasion.answer)
-    return None if occasion.departure is None else _follow(recovery, occasion.departure)
+    answer, lower = recovery.occasion.answer, recovery.occasion.departure
+    if answer is not None:
+        return _obey_answer(recovery, answer)
+    if lower is None:
+        return None
+    why_not = lower.why_not()
+    return _ask_since(recovery, why_not) if why_not else lower.verdict
 
 
 def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
@@ -81,11 +83,6 @@ def _obey_answer(recovery: Recovery, answer: Answer) -> Optional[Verdict]:
         kind=FailureKind.TIME_LIMIT, text='was taken out while it still ran'
     )
     return recovery.end_unaided() if recovery.budget.why_over() else None
-
-
-def _follow(recovery: Recovery, lower: Departure) -> Optional[Verdict]:
-    why_not = lower.why_not()
-    return _ask_since(recovery, why_not) if why_not else lower.verdict
 
 
 def _ask_since(recovery: Recovery, why: str) -> Optional[Verdict]:
