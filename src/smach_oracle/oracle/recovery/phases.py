@@ -7,7 +7,7 @@ which occasion is in a table of doc/inside/executive_inside.md.
 
 import threading
 from functools import partial
-from typing import Callable, Dict, FrozenSet, Optional, Tuple
+from typing import Callable, Dict, Optional, Tuple
 
 import smach
 
@@ -150,9 +150,8 @@ def _carry_out(recovery: Recovery, facts: DecisionFacts) -> Verdict:
             recovery, _why_nobody_is_asked(recovery) or Foreseen('the policy asks nobody')
         )
     recovery.recovered.append(recovery.record)
-    restarts = facts.action is Action.RESTART
-    written: FrozenSet[str] = frozenset() if restarts else way.kept(recovery.watch)
-    jump = JumpTo(way, written=written, restarts=restarts, chosen=recovery.chosen)
+    kept, restarts = way.kept(recovery.watch), facts.action is Action.RESTART
+    jump = JumpTo(way, written=kept, restarts=restarts, chosen=recovery.chosen)
     return _wait_and_jump(recovery, facts.wait_s, jump)
 
 
