@@ -49,7 +49,7 @@ def fallback_in_words(recovery: Recovery) -> str:
         return 'go to {}'.format(target)
     if verb == 'give_up' and target in node.machine.get_registered_outcomes():
         return 'end with {}'.format(target)
-    ending = recovery.natural_ending()
+    ending = recovery.ending()
     if ending.error is not None:
         return 'stop with the error {}'.format(type(ending.error).__name__)
     return (

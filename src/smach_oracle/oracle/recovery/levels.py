@@ -146,7 +146,7 @@ def levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNod
 
 def decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[JumpTo, float]]:
     """Return what the innermost level decides that does not ask, or None where all ask."""
-    below, ending = recovery.node, recovery.natural_ending()
+    below, ending = recovery.node, recovery.ending()
     for level in levels:
         failure = _failure_above(
             level, below.labels_from_parent[0], ending, '{}: {}'.format(below.path, recovery.cause)

@@ -44,7 +44,6 @@ from .occasions import FirstStep
 from .recovery import Recovery
 from .stop import preempt_beside
 from .verdict import (
-    ContainerEnding,
     Foreseen,
     GiveUp,
     JumpTo,
@@ -204,7 +203,7 @@ def _left_to_others(recovery: Recovery, way: Optional[JumpPath] = None) -> Optio
         return Foreseen('it runs as a precondition')
     if recovery.failure.is_held_back:  # no other oracle can confirm that it is repeated
         return None
-    foreseen = foreseen_above(node, recovery.natural_ending(), way)
+    foreseen = foreseen_above(node, recovery.ending(), way)
     return foreseen and foreseen._replace(
         text='its author goes on from there ({})'.format(foreseen.text)
     )
@@ -288,9 +287,7 @@ def _obey(recovery: Recovery, answer: Answer) -> Verdict:
         return recovery.when_well(JumpTo(way, answer.by, answer.why, way.kept(watch), asked=asked))
     if answer.kind is AnswerKind.SUPERSEDE:
         return Supersede(answer.outcome, answer.by, answer.why)
-    ending = (
-        ContainerEnding(outcome=answer.outcome) if answer.outcome else recovery.natural_ending()
-    )
+    ending = recovery.ending(answer.outcome)
     above = next((each for each in levels_above(node) if each.path == answer.container), None)
     return GiveUp(ending, answer.by, answer.why, above)
 

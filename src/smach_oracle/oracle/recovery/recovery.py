@@ -257,16 +257,15 @@ class Recovery:
             return self.end_early()
         return jump
 
-    def natural_ending(self) -> ContainerEnding:
-        """Return how the failure would have ended the container."""
+    def ending(self, outcome: str = '') -> ContainerEnding:
+        """End the container with an outcome, or ('') as the failure would have ended it."""
+        if outcome:
+            return ContainerEnding(outcome=outcome)
         return natural_ending(self.node, self.failure)
 
     def give_up(self, text: str, outcome: str = '') -> Verdict:
-        """End the container with an outcome, or ('') as the failure would have ended it."""
-        if self.occasion.keeps:
-            return self.keep(text)
-        ending = ContainerEnding(outcome=outcome) if outcome else self.natural_ending()
-        return GiveUp(ending, text=text)
+        """End the container. `outcome`: see `ending`."""
+        return self.keep(text) if self.occasion.keeps else GiveUp(self.ending(outcome), text=text)
 
     def keep(self, why: str) -> Verdict:
         """Stop where the machine stands, and keep the trial for the next start."""
