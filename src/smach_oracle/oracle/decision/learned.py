@@ -244,11 +244,11 @@ class _Gain:
 def _last_help(evidence: Evidence) -> str:
     """Return the way that has helped last after a failure of the same kind, '' for none."""
     same = (
-        each
+        each.way
         for each in reversed(evidence.results)
         if each.helped and each.failure == evidence.failure and each.place != BY_PERSON
     )
-    return next(same, WayResult('', '', FIRST, '', None, 0.0)).way
+    return next(same, '')
 
 
 def _why_back(results: Sequence[WayResult]) -> str:
