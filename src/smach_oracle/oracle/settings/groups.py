@@ -33,6 +33,9 @@ class Member(NamedTuple):
     kinds: Tuple[type, ...]  # of what stands for the whole group
 
 
+_NO_MEMBER = Member('', '', '', (), ())
+
+
 class Groups:
     """The groups of a dataclass of settings.
 
@@ -51,7 +54,7 @@ class Groups:
         self._others = list(others)
         self._keys = {name: facts['key'] or name for name, facts in fields.items()}
         self._members: Dict[str, Dict[str, Member]] = {group: {} for group in texts}
-        self._short: Dict[str, Member] = {}
+        self._short = dict.fromkeys(texts, _NO_MEMBER)
         for name, facts in fields.items():
             group, _, key = self._keys[name].partition('.')
             if key:
@@ -112,8 +115,8 @@ class Groups:
         `group`: where it stands, '' for the top.
         """
         meant = {each.key: self._keys[each.name] for each in self._members.get(group, {}).values()}
-        short = self._short.get(group)
-        meant.update({mark: '{}.{}'.format(group, mark) for mark in (short.marks if short else ())})
+        marks = self._short.get(group, _NO_MEMBER).marks
+        meant.update({mark: '{}.{}'.format(group, mark) for mark in marks})
         here = list(meant)
         for members in self._members.values():
             for each in members.values():
@@ -135,30 +138,29 @@ class Groups:
                 yield from self._of_group(key, value)
 
     def _of_group(self, group: str, value: object) -> Iterator[GivenSetting]:
-        members, short = self._members[group], self._short.get(group)
+        members, short = self._members[group], self._short[group]
         if not isinstance(value, Mapping):
-            if short is None or not isinstance(as_text(value), short.kinds):
+            if not isinstance(as_text(value), short.kinds):
                 raise SettingsError(group, value, self._allowed(group))
             yield GivenSetting(short.name, group, value)
             return
         alone: Dict[str, object] = {}
-        name, marks = (short.name, short.marks) if short else ('', ())
-        is_one = any(mark in value for mark in marks)
+        is_one = any(mark in value for mark in short.marks)
         for key, each in checks.mapping(group, value).items():
             if key in members:
                 yield GivenSetting(members[key].name, '{}.{}'.format(group, key), each)
             elif is_one:
                 alone[key] = each
             else:
-                allowed = [*members, *marks]
+                allowed = [*members, *short.marks]
                 raise no_such('{}.{}'.format(group, key), each, allowed, self.hint(key, group))
         if alone:
-            yield GivenSetting(name, group, alone)
+            yield GivenSetting(short.name, group, alone)
 
     def _allowed(self, group: str) -> str:
         keys = 'a mapping with some of the keys ' + ', '.join(self._members[group])
-        short = self._short.get(group)
-        return '{}, or {}'.format(short.short, keys) if short else keys
+        short = self._short[group].short
+        return '{}, or {}'.format(short, keys) if short else keys
 
 
 def no_such(key: str, value: object, allowed: Any, hint: str) -> SettingsError:
