@@ -29,7 +29,6 @@ from typing import (
     Sequence,
     Tuple,
     TypeVar,
-    cast,
 )
 
 from smach_common.foreign import error_text
@@ -59,26 +58,23 @@ def is_state(value: object) -> bool:
         return False
 
 
-def number(low: float, high: float, allowed: str) -> Check[float]:
-    """Check for a number from `low` to `high`. Its SettingsError says `allowed`."""
-
-    def check(key: str, value: object) -> float:
-        if not is_number(value, low, high):
+def _value_that(fits: Callable[[object], bool], kind: Callable[[Any], T], allowed: str) -> Check[T]:
+    def check(key: str, value: object) -> T:
+        if not fits(value):
             raise SettingsError(key, value, allowed)
-        return float(cast('float', value))
+        return kind(value)
 
     return check
+
+
+def number(low: float, high: float, allowed: str) -> Check[float]:
+    """Check for a number from `low` to `high`. Its SettingsError says `allowed`."""
+    return _value_that(lambda value: is_number(value, low, high), float, allowed)
 
 
 def whole(low: int, allowed: str, high: float = math.inf) -> Check[int]:
     """Check for a whole number from `low` to `high`. Its SettingsError says `allowed`."""
-
-    def check(key: str, value: object) -> int:
-        if not is_whole(value, low, high):
-            raise SettingsError(key, value, allowed)
-        return int(cast('int', value))
-
-    return check
+    return _value_that(lambda value: is_whole(value, low, high), int, allowed)
 
 
 def flag(key: str, value: object) -> bool:
