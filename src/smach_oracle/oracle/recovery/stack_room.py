@@ -32,8 +32,16 @@ def too_deep_here(top: smach.Container, name: str, error: BaseException) -> Opti
     """
     if sys.getrecursionlimit() - _frames_in_use() >= NEEDED_FRAMES:
         return None
-    has_overrun = any(isinstance(each, RecursionError) for each in _chain(error))
-    return _too_deep(top, name) if has_overrun else None
+    if not any(isinstance(each, RecursionError) for each in _chain(error)):
+        return None
+    limit, depth = sys.getrecursionlimit(), _depth_of(top)
+    wanted = limit + _FRAMES_OF_CONTAINER * depth
+    return TooDeepError(
+        '{}: {} containers lie in each other, and the stack of Python, which has {} frames, is '
+        'full. Call sys.setrecursionlimit({}) before the machine runs'.format(
+            name, depth, limit, -(-wanted // 1000) * 1000
+        )
+    )
 
 
 def _chain(error: BaseException) -> Iterator[BaseException]:
@@ -51,17 +59,6 @@ def _frames_in_use() -> int:
     while frame is not None:
         count, frame = count + 1, frame.f_back
     return count
-
-
-def _too_deep(top: smach.Container, name: str) -> TooDeepError:
-    limit, depth = sys.getrecursionlimit(), _depth_of(top)
-    wanted = limit + _FRAMES_OF_CONTAINER * depth
-    return TooDeepError(
-        '{}: {} containers lie in each other, and the stack of Python, which has {} frames, is '
-        'full. Call sys.setrecursionlimit({}) before the machine runs'.format(
-            name, depth, limit, -(-wanted // 1000) * 1000
-        )
-    )
 
 
 def _depth_of(container: object) -> int:
