@@ -1,6 +1,6 @@
 """Makes a question of a failure, with everything that an expert needs (paper, section V)."""
 
-from typing import Collection, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
+from typing import Collection, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import smach
 from smach_common.foreign import repr_of
@@ -13,7 +13,7 @@ from ..asking.question import (
     Question,
     StateChoice,
 )
-from ..decision.ways import Evidence, WayCounts, key_of, way_in_words
+from ..decision.ways import Evidence, key_of, way_in_words
 from ..identity import truth_of
 from ..machine.places import (
     JumpPath,
@@ -31,7 +31,7 @@ from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..settings.settings import GROUPS
 from ..smach_private import data_of, remapping_of, states_of
 from .falling_back import fallback_in_words
-from .options import Option, choices_on, places_on
+from .options import choices_on, places_on
 from .recovery import Recovery
 from .verdict import streak_of
 
@@ -89,58 +89,50 @@ def _target(recovery: Recovery, place: TreePlace) -> Target:
     return '' if place.node is recovery.node else place.node.path, place.label
 
 
-def _state_choices(recovery: Recovery) -> Iterator[StateChoice]:
+def _state_choices(recovery: Recovery) -> Sequence[StateChoice]:
+    """Return the choices, and recommend the one that has helped most of the time, if one has.
+
+    That one can be entered now, repeats nothing that is not to be repeated, was tried twice or
+    more, and was not in vain just before.
+    """
+    node, record = recovery.node, recovery.record
     written: Collection[str] = () if recovery.failure.still_runs else recovery.watch.written()
-    choices = list(choices_on(recovery))
-    evidence = Evidence(recovery.record.ways_so_far(), recovery.failure_key)
-    names = [name_of(each.place, recovery.node) for each, _ in choices]
-    keys = [key_of(name, recovery.record.label) for name in names]
-    counts = [evidence.of_way(key) for key in keys]
-    streak = streak_of(recovery.node, recovery.record)
-    tried = () if streak is None else tuple(streak.tried)
-    recommended = _recommended(
-        [(each, key in tried) for (each, _), key in zip(choices, keys)], counts
-    )
-    for number, (each, way) in enumerate(choices):
+    evidence = Evidence(record.ways_so_far(), recovery.failure_key)
+    streak = streak_of(node, record)
+    choices: List[StateChoice] = []
+    shares: List[float] = []  # by which one is recommended
+    for each, way in choices_on(recovery):
         container, label = _target(recovery, each.place)
-        record, jump_path = each.place.node.record(label), each.jump_path
-        yield StateChoice(
+        there, jump_path = each.place.node.record(label), each.jump_path
+        key = key_of(name_of(each.place, node), record.label)
+        known = evidence.of_way(key)
+        choice = StateChoice(
             label,
-            1.0 - record.rate,
-            int(record.failure_class),
-            record.visits,
+            1.0 - there.rate,
+            int(there.failure_class),
+            there.visits,
             missing_on(jump_path, () if jump_path.left_containers else written),
-            tuple(spec.name for spec in record.settings.preconditions),
+            tuple(spec.name for spec in there.settings.preconditions),
             each.closed,
             each.repeats,
             container,
             _running_again(jump_path),
             '' if way is None else way.key,
             0.0 if way is None else way.minutes,
-            counts[number].helped,
-            counts[number].tried,
-            60.0 * counts[number].minutes,
-            RECOMMENDED.format(*counts[number]) if number == recommended else '',
+            known.helped,
+            known.tried,
+            60.0 * known.minutes,
         )
-
-
-def _recommended(
-    options: Sequence[Tuple[Option, bool]], counts: Sequence[WayCounts]
-) -> Optional[int]:
-    """Return the number of the choice that has helped most of the time, None where none has.
-
-    It can be entered now, repeats nothing that is not to be repeated, and was tried twice or more.
-
-    :param options: each with whether going there was in vain just before.
-    """
-    possible = [
-        (each.share, -number)
-        for number, each in enumerate(counts)
-        if each.tried > 1
-        and 2 * each.helped > each.tried
-        and not (options[number][1] or options[number][0].closed or options[number][0].repeats)
-    ]
-    return -max(possible)[1] if possible else None
+        is_in_vain = streak is not None and key in streak.tried
+        has_helped = known.tried > 1 and 2 * known.helped > known.tried
+        is_possible = has_helped and not (is_in_vain or each.closed or each.repeats)
+        choices.append(choice)
+        shares.append(known.share if is_possible else 0.0)
+    if any(shares):
+        best = shares.index(max(shares))
+        text = RECOMMENDED.format(choices[best].helped, choices[best].tried)
+        choices[best] = choices[best]._replace(recommended=text)
+    return choices
 
 
 def _outcomes_of(machine: smach.StateMachine) -> Tuple[str, ...]:
