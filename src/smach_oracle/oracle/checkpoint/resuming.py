@@ -377,7 +377,7 @@ class _Setting:
         stood = self._resumption.tree.container(top.key)
         stood.at, at = [way.first_label, BEFORE], stored.at_there
         self._resumed.enter_at(top.records, EntryPoint(top, stood, way.entered_places[1:]))
-        there, place = StoredContainer(at), way.entered_places[-1]
+        there, place = StoredContainer(at), way.place
         record = place.node.record(place.label)
         self._reopen(record, stored)
         if there.phase == IN:

@@ -91,7 +91,7 @@ class Applying:
         if lower is not None:
             told[JUMPED_FROM] = lower.failed_path
         if len(way.entered_places) > 1:
-            told[JUMPED_TO] = way.entered_places[-1].path
+            told[JUMPED_TO] = way.place.path
         self._go_on(target, jump.by, jump.text, told)
 
     def _supersede(self, verdict: Supersede) -> Optional[str]:

@@ -54,7 +54,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
 
 def _in_words(verdict: Verdict) -> str:
     if isinstance(verdict, JumpTo):
-        return verdict.jump_path.entered_places[-1].path
+        return verdict.jump_path.place.path
     return 'its end with {}'.format(cast('GiveUp', verdict).ending.outcome)
 
 

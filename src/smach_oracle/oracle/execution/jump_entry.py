@@ -49,7 +49,7 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> Dict[st
     for place in way.entered_places:
         ask_to_go_on(place.node, place.label)
     if missing:
-        place = way.entered_places[-1]
+        place = way.place
         place.node.warn(
             '{} there without its input keys {}'.format(sent, ', '.join(missing)), place.label
         )
@@ -69,7 +69,7 @@ def missing_for(way: JumpPath, written: Collection[str]) -> Tuple[str, ...]:
     :param written: keys of the container that holds the whole way, written for it.
     """
     missing = missing_on(way, written)
-    node, label = way.entered_places[-1]
+    node, label = way.place
     if not missing or node is not way.meeting_node:  # keys of its own may have the same names
         return missing
     remapping = remapping_of(node.machine, label)
@@ -148,9 +148,7 @@ def prospect_of(place: TreePlace, written: Tuple[str, ...]) -> Prospect:
 def _prospect_on(way: JumpPath, written: Tuple[str, ...]) -> Prospect:
     closed_now = why_closed_on(way)
     if closed_now:
-        return Prospect(
-            '{} cannot be entered now: {}'.format(way.entered_places[-1].label, closed_now)
-        )
+        return Prospect('{} cannot be entered now: {}'.format(way.place.label, closed_now))
     return Prospect('', missing_for(way, written), repeated_on(way))
 
 
@@ -173,7 +171,7 @@ def make_jump(node: TreeNode, jump: Jump) -> bool:
     node.records.take_up_work()
     by = jump.by or 'an operator'
     if jump.container:
-        data['to'] = way.entered_places[-1].path
+        data['to'] = way.place.path
     node.emit(
         EventKind.SENT, state=label, target=way.first_label, by=jump.by, text=jump.text, data=data
     )

@@ -295,6 +295,11 @@ class JumpPath(NamedTuple):
         """Return the label of the state of the `meeting_node` that is entered."""
         return self.entered_places[0].label
 
+    @property
+    def place(self) -> TreePlace:
+        """Return the place to which it leads."""
+        return self.entered_places[-1]
+
     def kept(self, watch: WriteWatch) -> FrozenSet[str]:
         """Return the keys that a recovery wrote and that survive a restore where the ways meet.
 
@@ -331,7 +336,7 @@ def why_closed_on(way: JumpPath) -> str:
     for place in way.entered_places:
         why = why_closed(place.node, place.label)
         if why:
-            return why if place is way.entered_places[-1] else '{} {}'.format(place.path, why)
+            return why if place is way.place else '{} {}'.format(place.path, why)
     return ''
 
 
@@ -345,7 +350,7 @@ def missing_on(way: JumpPath, written: Iterable[str]) -> Tuple[str, ...]:
 
     :param written: keys of the container of `meeting_node` that survive a restore.
     """
-    node, label = way.entered_places[-1]
+    node, label = way.place
     if not states_of(node.machine)[label].get_registered_input_keys():
         return ()
     keys = set(_keys_after_jump(way.meeting_node, way.first_label, tuple(written)))

@@ -184,11 +184,7 @@ def _decide_above(
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
-    way = (
-        jump_path_to(below, above.jump_path.entered_places[-1])
-        if above.jump_path is not None
-        else None
-    )
+    way = jump_path_to(below, above.jump_path.place) if above.jump_path is not None else None
     if recovery.is_over():  # by a preempt while its preconditions ran
         record.take_back_failure()
         return None

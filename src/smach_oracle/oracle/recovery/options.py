@@ -59,11 +59,6 @@ class Option(NamedTuple):
     closed: str
     repeats: Tuple[str, ...]
 
-    @property
-    def place(self) -> TreePlace:
-        """Return the place."""
-        return self.jump_path.entered_places[-1]
-
 
 class OpenWay(NamedTuple):
     """A way of the menu, and the option that it is."""
@@ -124,9 +119,9 @@ def choices_on(recovery: Recovery) -> Iterator[Tuple[Option, Optional[Way]]]:
     """
     ways: Dict[TreePlace, Way] = {}
     for way, option in menu_on(recovery):
-        ways.setdefault(option.place, way)
+        ways.setdefault(option.jump_path.place, way)
     for option in places_on(recovery):
-        yield option, ways.get(option.place)
+        yield option, ways.get(option.jump_path.place)
 
 
 # -- why the machine does not go there by itself
@@ -159,7 +154,7 @@ def why_repeats(recovery: Recovery, option: Option) -> str:
     """Say what would be repeated if the machine went to a place by itself, or '' if nothing."""
     if not option.repeats:
         return ''
-    target, place = named(recovery, option.jump_path), option.place
+    target, place = named(recovery, option.jump_path), option.jump_path.place
     if not has_visited(place.node, place.label):
         return 'this trial has not been in {}, and going there may repeat {}'.format(
             target, ', '.join(option.repeats)
@@ -180,7 +175,7 @@ def function_that_runs(recovery: Recovery) -> str:
 
 def named(recovery: Recovery, way: JumpPath) -> str:
     """Return the label of a place, or its path where it is in another container."""
-    place = way.entered_places[-1]
+    place = way.place
     return place.label if place.node is recovery.node else place.path
 
 

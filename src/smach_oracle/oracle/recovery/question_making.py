@@ -82,7 +82,7 @@ def make_question(recovery: Recovery, deadline_s: float) -> Question:
 
 def targets_of(recovery: Recovery) -> Mapping[Target, str]:
     """Return where the machine could go, and why it cannot go there now, '' where it can."""
-    return {_target(recovery, each.place): each.closed for each in places_on(recovery)}
+    return {_target(recovery, each.jump_path.place): each.closed for each in places_on(recovery)}
 
 
 def _target(recovery: Recovery, place: TreePlace) -> Target:
@@ -102,9 +102,9 @@ def _state_choices(recovery: Recovery) -> Sequence[StateChoice]:
     choices: List[StateChoice] = []
     shares: List[float] = []  # by which one is recommended
     for each, way in choices_on(recovery):
-        container, label = _target(recovery, each.place)
-        there, jump_path = each.place.node.record(label), each.jump_path
-        key = key_of(name_of(each.place, node), record.label)
+        jump_path, place = each.jump_path, each.jump_path.place
+        container, label = _target(recovery, place)
+        there, key = place.node.record(label), key_of(name_of(place, node), record.label)
         known = evidence.of_way(key)
         choice = StateChoice(
             label,
@@ -156,7 +156,7 @@ def _running_again(way: JumpPath) -> Tuple[str, ...]:
 
     They are those of the outermost Concurrence that is entered, be it the place or on the way down.
     """
-    last = way.entered_places[-1]
+    last = way.place
     entered: List[smach.State] = [
         link.inner_container for below in way.entered_places[1:] for link in links_to(below.node)
     ]

@@ -190,7 +190,7 @@ class Recovery:
         """Return the choice of a person as a way, None where its result is not to be noted."""
         if not self.node.in_force.policy.goes_by_ways:
             return None
-        key = key_of(name_of(path.entered_places[-1], self.node), self.record.label)
+        key = key_of(name_of(path.place, self.node), self.record.label)
         return self._gone(key, kind_of_choice(key), BY_PERSON)
 
     def _gone(
@@ -251,9 +251,7 @@ class Recovery:
         """Return a jump, after a wait where the robot is not well."""
         health = self.node.tree.health
         why = health.why_unwell(self.scope) if health.is_set else ''
-        if why and not self.wait_until_well(
-            'is left for ' + jump.jump_path.entered_places[-1].label, why
-        ):
+        if why and not self.wait_until_well('is left for ' + jump.jump_path.place.label, why):
             return self.end_early()
         return jump
 

@@ -152,7 +152,7 @@ class Departure:
         repeated = sorted(set(repeated_on(way)).difference(self._repeated))
         if not (closed or repeated):
             return ''
-        place = way.entered_places[-1].path
+        place = way.place.path
         return 'cannot go to {}: {}'.format(
             place,
             closed or '{} was done while the way there was made free'.format(', '.join(repeated)),
