@@ -75,14 +75,10 @@ class Estimates:
                 minutes[way] = total + weight * took, number + weight
                 if helped is not None:
                     results[way] = results.get(way, 0) + 1
-                    key = way, place
-                    has, has_not = of_state.get(key, _NOTHING)
-                    of_state[key] = (has + weight, has_not) if helped else (has, has_not + weight)
-                    if failure == evidence.failure:
-                        has, has_not = of_failure.get(key, _NOTHING)
-                        of_failure[key] = (
-                            (has + weight, has_not) if helped else (has, has_not + weight)
-                        )
+                    key, is_same = (way, place), failure == evidence.failure
+                    for counts in (of_state, of_failure) if is_same else (of_state,):
+                        has, has_not = counts.get(key, _NOTHING)
+                        counts[key] = (has + weight, has_not) if helped else (has, has_not + weight)
             if place == FIRST:
                 age += 1.0
                 weight = 0.5 ** (age / HALF_LIFE)
