@@ -1,7 +1,7 @@
 """The levels above a failed state: what its author foresaw there, and what their oracles decide."""
 
 from functools import partial
-from typing import Dict, List, Optional, Tuple
+from typing import Dict, List, Optional
 
 import smach
 
@@ -144,7 +144,7 @@ def levels_that_may_decide(recovery: Recovery, decider: Decider) -> List[TreeNod
     return found
 
 
-def decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[JumpTo, float]]:
+def decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[JumpTo]:
     """Return what the innermost level decides that does not ask, or None where all ask."""
     below, ending = recovery.node, recovery.ending()
     for level in levels:
@@ -161,16 +161,13 @@ def decided_above(recovery: Recovery, levels: List[TreeNode]) -> Optional[Tuple[
     return None
 
 
-def _decide_above(
-    recovery: Recovery, level: TreeNode, failure: Failure
-) -> Optional[Tuple[JumpTo, float]]:
+def _decide_above(recovery: Recovery, level: TreeNode, failure: Failure) -> Optional[JumpTo]:
     """Have a level above decide about its own state, as if that had failed.
 
     That is a failure of the state only where the oracle does not ask.
 
     :param failure: the end of the level below, as it would be judged here.
-    :returns: the jump, and for how long it waits before, s. None where this level asks too, or has
-        been left meanwhile.
+    :returns: the jump. None where this level asks too, or has been left meanwhile.
     """
     record, below = level.record(failure.state), recovery.node
     if jump_path_to(below, TreePlace(level, record.label)) is None:
@@ -198,8 +195,7 @@ def _decide_above(
     sentence = tell_decision(above, decided)
     recovery.recovered.append(record)
     kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART
-    jump = JumpTo(way, '', sentence, kept, level, restarts, above.chosen)
-    return jump, facts.wait_s
+    return JumpTo(way, '', sentence, kept, level, restarts, facts.wait_s, above.chosen)
 
 
 def tell_decision(recovery: Recovery, decided: Decided) -> str:

@@ -150,14 +150,8 @@ def _carry_out(recovery: Recovery, facts: DecisionFacts) -> Verdict:
         )
     recovery.recovered.append(recovery.record)
     kept, restarts = way.kept(recovery.watch), facts.action is Action.RESTART
-    jump = JumpTo(way, written=kept, restarts=restarts, chosen=recovery.chosen)
-    return _wait_and_jump(recovery, facts.wait_s, jump)
-
-
-def _wait_and_jump(recovery: Recovery, wait_s: float, jump: JumpTo) -> Verdict:
-    if wait_s and not recovery.has_waited(wait_s):
-        return recovery.end_early()
-    return recovery.when_well(jump)
+    jump = JumpTo(way, written=kept, restarts=restarts, wait_s=facts.wait_s, chosen=recovery.chosen)
+    return recovery.after_waits(jump)
 
 
 # -- the levels above
@@ -178,13 +172,12 @@ def escalate(recovery: Recovery) -> Optional[Verdict]:
         else _asked_in_words(recovery)
     )
     tell_decision(recovery, (decider, facts._replace(asked=asked)))
-    outer = decided_above(recovery, levels)
+    jump = decided_above(recovery, levels)
     if recovery.is_over():
         return recovery.end_early()
-    if outer is not None:
+    if jump is not None:
         recovery.recovered.append(recovery.record)
-        jump, wait_s = outer
-        return _wait_and_jump(recovery, wait_s, jump)
+        return recovery.after_waits(jump)
     return _give_way(recovery, nobody) if nobody else None
 
 
@@ -283,8 +276,8 @@ def _obey(recovery: Recovery, answer: Answer) -> Verdict:
         if way is None:  # an answer that was checked has one
             named = '{}/{}'.format(answer.container or node.path, answer.state)
             raise smach.InvalidStateError('there is no way to ' + named)
-        asked = recovery.asked_for(way)
-        return recovery.when_well(JumpTo(way, answer.by, answer.why, way.kept(watch), asked=asked))
+        kept, asked = way.kept(watch), recovery.asked_for(way)
+        return recovery.after_waits(JumpTo(way, answer.by, answer.why, kept, asked=asked))
     if answer.kind is AnswerKind.SUPERSEDE:
         return Supersede(answer.outcome, answer.by, answer.why)
     ending = recovery.ending(answer.outcome)

@@ -218,12 +218,6 @@ class Recovery:
     def _in_time(self) -> Scope:
         return Scope(self.scope, look=lambda: Reason.TIME_OVER if self.budget.why_over() else None)
 
-    def has_waited(self, seconds: float) -> bool:
-        """Let time pass. Return False where something has ended the recovery meanwhile."""
-        with standing_still(self.node.execution.runs_around):
-            self.node.tree.waiting.wait(seconds, 'waiting', self._in_time())
-        return not self.is_over()
-
     def has_waited_after(self, what: str) -> bool:
         """Wait where the robot was not well at what has happened.
 
@@ -245,10 +239,15 @@ class Recovery:
 
     def jump(self, way: JumpPath, text: str = '') -> Verdict:
         """Go to a place, once the robot is well."""
-        return self.when_well(JumpTo(way, text=text, written=way.kept(self.watch)))
+        return self.after_waits(JumpTo(way, text=text, written=way.kept(self.watch)))
 
-    def when_well(self, jump: JumpTo) -> Verdict:
-        """Return a jump, after a wait where the robot is not well."""
+    def after_waits(self, jump: JumpTo) -> Verdict:
+        """Return a jump, once its wait is over and the robot is well."""
+        if jump.wait_s:
+            with standing_still(self.node.execution.runs_around):
+                self.node.tree.waiting.wait(jump.wait_s, 'waiting', self._in_time())
+            if self.is_over():
+                return self.end_early()
         health = self.node.tree.health
         why = health.why_unwell(self.scope) if health.is_set else ''
         if why and not self.wait_until_well('is left for ' + jump.jump_path.place.label, why):

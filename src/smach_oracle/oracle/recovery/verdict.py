@@ -84,6 +84,7 @@ class JumpTo(NamedTuple):
     written: FrozenSet[str] = frozenset()
     decided_by: Optional[TreeNode] = None  # the level above, as if its own state had failed
     restarts: bool = False  # with the userdata of the start, in all containers
+    wait_s: float = 0.0  # before
     chosen: Optional[ChosenWay] = None  # of the streak that it belongs to
     asked: Optional[ChosenWay] = None  # the choice of a person, of no streak
 
