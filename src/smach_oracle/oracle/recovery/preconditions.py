@@ -8,7 +8,7 @@ through their output keys, and down through the input keys of the containers aro
 state.
 """
 
-from typing import Dict, List, Tuple, Union, cast
+from typing import List, Union, cast
 
 import smach
 from smach_common.foreign import repr_of
@@ -221,10 +221,8 @@ class _Elsewhere:
         self._runs = not way.entered_places[1:]
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
-        data = [data_of(link.inner_container.userdata) for link in self._down[:-1]]
-        self._before: List[Tuple[Dict[str, object], Dict[str, object]]] = [
-            (each, dict(each)) for each in data
-        ]
+        below = [data_of(link.inner_container.userdata) for link in self._down[:-1]]
+        self._before = [(data, dict(data)) for data in below]
         self.gate = self._watch.gate
         for link in self._down:
             hand_down(link)
