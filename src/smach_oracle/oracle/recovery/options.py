@@ -280,7 +280,8 @@ def menu_on(recovery: Recovery) -> Iterator[OpenWay]:
         jump_path = jump_path_to(node, place)
         if jump_path is not None:
             passed = visited[: visited.index(name) + 1]
-            entered = [each for one in passed for each in _entered_at(node, one)]
+            places = [(one, place_named(node, one)) for one in passed]
+            entered = [each for one, there in places if there for each in _entered_in(there, one)]
             back = Way(
                 kind,
                 name,
@@ -315,13 +316,8 @@ def _goals(
             yield kind, name, place_named(node, name)
 
 
-def _entered_at(node: TreeNode, name: str) -> Iterator[Tuple[str, bool]]:
-    """Yield a state, or what was visited in it if it is a machine, and whether it has succeeded."""
-    place = place_named(node, name)
-    return iter(()) if place is None else _entered_in(place, name)
-
-
 def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
+    """Yield a state, or what was visited in it if it is a machine, and whether it has succeeded."""
     below = node_of(states_of(place.node.machine)[place.label])
     inner: List[TreePlace] = []
     if below is not None:
