@@ -324,10 +324,7 @@ class OracleState(smach.State):
 
     def leads_on(self, states: Labels, outcomes: Labels, drawn: Transitions) -> bool:
         """Whether nothing of that has changed since."""
-        led_states, led_outcomes, led_drawn, count = self._led
-        if drawn is not led_drawn or len(drawn) != count:
-            return False
-        return led_outcomes == outcomes and led_states == states
+        return drawn is self._led[2] and self._led == (states, outcomes, drawn, len(drawn))
 
     def begin(self, recovery: Recovery) -> None:
         """Be ready to recover from a failure.
