@@ -32,11 +32,11 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
     To be called in the thread of the failed state's container, its lock not held: what runs in the
     containers is preempted.
     """
-    left_nodes = _nodes_left_for(node, level)
-    if not left_nodes:
+    levels = [node, *levels_above(node)]
+    if level not in levels:
         return False
     departure = Departure(verdict, level, '{}/{}'.format(node.path, label))
-    nodes = [*left_nodes, level]
+    nodes = levels[: levels.index(level) + 1]
     others, leaving = _claim(nodes, departure)
     if others:
         request_preempt(_container_apart(nodes, others, leaving))
@@ -48,7 +48,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
         )
     )
     request_preempt(current_state_of(level.machine))
-    _preempt_left_nodes(left_nodes)
+    _preempt_left_nodes(nodes[:-1])
     return True
 
 
@@ -75,16 +75,6 @@ def _preempt_left_nodes(left_nodes: List[TreeNode]) -> None:
     for container in around[:-1]:
         if not container.preempt_requested():
             request_preempt(container)
-
-
-def _nodes_left_for(node: TreeNode, arrives_at: TreeNode) -> List[TreeNode]:
-    """Return the containers from that of a failure up to below a level. None if it is no level."""
-    left_nodes = [node]
-    for level in levels_above(node):
-        if level is arrives_at:
-            return left_nodes
-        left_nodes.append(level)
-    return []
 
 
 def _claim(nodes: List[TreeNode], departure: Departure) -> Tuple[List[TreeNode], Departure]:
@@ -122,8 +112,8 @@ def _container_apart(
     if len(others) == len(nodes):
         return None
     path, below = others[0].path, nodes[-len(others) - 1]
-    for label, link in zip(below.labels_from_parent, links_to(below)):
-        path = '{}/{}'.format(path, label)
+    for link in links_to(below):
+        path = '{}/{}'.format(path, link.label)
         if not leaving.failed_path.startswith(path + '/'):
             return None if link.inner_container is nodes[0].machine else link.inner_container
     return None
