@@ -54,12 +54,10 @@ class ChosenWay(NamedTuple):
         if streak is not None:
             streak.note(self.gone.way, self.gone.hoped is not None)
             streak.leaves = False
-        below = self.node
-        while below.parent is not None:
-            around = streak_of(below.parent, below.parent.record(below.labels_from_parent[0]))
+        for below, above in zip((self.node, *self.node.around()), self.node.around()):
+            around = streak_of(above, above.record(below.labels_from_parent[0]))
             if around is not None:
                 around.attempts += 1
-            below = below.parent
 
     def go(self) -> None:
         """Note that it is gone now, outside every streak."""
