@@ -173,7 +173,6 @@ class Step:
             FailureKind.TIME_LIMIT,
             told,
             'was left, as {} failed'.format(departure.failed_path),
-            None,
         )
         return occasions.arrived(failure, self._context(), departure, told, departure.is_own(node))
 

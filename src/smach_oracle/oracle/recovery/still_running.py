@@ -188,7 +188,7 @@ class WatchedVisit:
 
     def _failure(self) -> Failure:
         sentence = still_running_sentence(self._record.label, self._ran_s(), self._record.longest_s)
-        return Failure(self._record.label, FailureKind.STILL_RUNNING, '', sentence, None)
+        return Failure(self._record.label, FailureKind.STILL_RUNNING, '', sentence)
 
     def _begin_question(self, recovery: Recovery) -> None:
         """Say in the next question how long the state has run by then."""
