@@ -1,7 +1,7 @@
 """Sets a tree to where a stored trial stood, so that its execution goes on from there."""
 
 import time
-from typing import List, NamedTuple, Optional, Sequence, Tuple, cast
+from typing import Dict, List, NamedTuple, Optional, Sequence, Tuple, cast
 
 import smach
 from smach_oracle.store.names import BEFORE, ENDED, FAILED, IN
@@ -16,7 +16,7 @@ from ..machine.repeats import begin_once_more, leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
-from ..records.events import EventKind, FailureKind
+from ..records.events import FailureKind
 from ..records.facts import LAST_SEQ
 from ..records.running_goals import GOALS
 from ..settings.failure_rule import RULE, FailureRule
@@ -53,8 +53,11 @@ class Resumption(NamedTuple):
         return max(0.0, time.time() - self.at)
 
 
-def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
-    """Say that a trial goes on."""
+def tell_resumed(top: TreeNode, resumption: Resumption) -> Dict[str, object]:
+    """Say that a trial goes on, and return what its RESUMED has.
+
+    What has run until its program was stopped is ended before.
+    """
     smach.logwarn(
         '{}: trial {} goes on{}; its program was stopped {:.0f} s ago'.format(
             top.path,
@@ -77,16 +80,13 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> None:
     if top.tree.control.paused:
         smach.logwarn('{}: is paused, as before its program was stopped'.format(top.path))
     _end_goals(top, resumption)
-    top.emit(
-        EventKind.RESUMED,
-        data={
-            LAST_SEQ: resumption.seq,
-            'moment': resumption.moment,
-            'stopped_s': round(resumption.age_s, 3),
-            'changes': resumption.script.changes,
-            RULE: rule.as_data(),
-        },
-    )
+    return {
+        LAST_SEQ: resumption.seq,
+        'moment': resumption.moment,
+        'stopped_s': round(resumption.age_s, 3),
+        'changes': resumption.script.changes,
+        RULE: rule.as_data(),
+    }
 
 
 def _end_goals(top: TreeNode, resumption: Resumption) -> None:

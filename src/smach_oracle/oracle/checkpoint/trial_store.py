@@ -74,6 +74,10 @@ RESTARTED = 'restarted'  # in place of the outcome of a trial that was given up 
 class TrialStore:
     """The traces that one trial leaves in the store that the settings name."""
 
+    _goes_on_from: Optional[Tuple[str, int]] = None  # an earlier moment, and its store
+    _writer: Optional[StoreWriter] = None
+    _observer: Optional[Checkpointer] = None
+
     def __init__(self, top: TreeNode) -> None:
         """Hold the machine in the store.
 
@@ -81,6 +85,8 @@ class TrialStore:
         """
         settings = top.settings
         self._top = top
+        meta = settings.oracle_label if top.tree.recover else ''
+        self._structure = structure_of(top.machine, meta)
         self._lock = MachineLock(settings.checkpoint, top.name)
         self._lock.take()
         try:
@@ -88,8 +94,6 @@ class TrialStore:
         except BaseException:
             self._lock.release()
             raise
-        meta = settings.oracle_label if top.tree.recover else ''
-        self._structure = structure_of(top.machine, meta)
 
     def to_resume(self) -> Optional[Resumption]:
         """Return the trial that goes on, None where a new one begins.
@@ -182,7 +186,7 @@ class TrialStore:
                     self._top.name
                 ),
             )
-        _used.add(used)
+        self._goes_on_from = used
         return number
 
     def _resumption(
@@ -236,22 +240,22 @@ class TrialStore:
             with self._or_let_go():
                 go_on(top, resumed)
         new = NewTrial(top.name, top.trial_id, (*self._structure,), time.time())
-        self._writer = StoreWriter(
+        writer = self._writer = StoreWriter(
             self._store,
             new if resumed is None else resumed.trial.number,
             settings.checkpoint_wait_s,
             smach.logwarn,
         )
-        self._observer = Checkpointer(
+        observer = self._observer = Checkpointer(
             top,
-            self._writer,
+            writer,
             StoredTree({}, {}) if resumed is None else resumed.tree,
             resumed.moment if resumed and resumed.is_earlier else None,
             self._first_facts(resumed),
         )
-        GOALS.observers.append(self._observer.goal_begins)
-        top.tree.keep_marks = self._observer.keep_marks
-        top.events.observers.insert(0, self._observer)  # before who may hold the machine up
+        GOALS.observers.append(observer.goal_begins)
+        top.tree.keep_marks = observer.keep_marks
+        top.events.observers.insert(0, observer)  # before who may hold the machine up
 
     def _first_facts(self, resumed: Optional[Resumption]) -> List[Fact]:
         """Return what is stored of the whole trial as it begins, or goes on.
@@ -282,12 +286,32 @@ class TrialStore:
 
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""
-        remove_identical(self._top.events.observers, self._observer)
-        GOALS.observers.remove(self._observer.goal_begins)
-        self._top.tree.keep_marks = no_store
-        self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
-        self._writer.close(None if why in _CAN_GO_ON else Ending(at, outcome))
-        self._let_go()
+        if self._goes_on_from is not None:
+            _used.add(self._goes_on_from)
+        self._observe_no_more()
+        if self._observer is not None:
+            self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
+        self._close(None if why in _CAN_GO_ON else Ending(at, outcome))
+
+    def let_go(self) -> None:
+        """Let go of the store, as its trial does not begin. What it holds can still go on."""
+        self._observe_no_more()
+        self._close(None)
+
+    def _observe_no_more(self) -> None:
+        observer = self._observer
+        if observer is not None:
+            remove_identical(self._top.events.observers, observer)
+            with contextlib.suppress(ValueError):  # it may not have come so far
+                GOALS.observers.remove(observer.goal_begins)
+            self._top.tree.keep_marks = no_store
+
+    def _close(self, ending: Optional[Ending]) -> None:
+        try:
+            if self._writer is not None:
+                self._writer.close(ending)
+        finally:
+            self._let_go()
 
     def _let_go(self) -> None:
         self._store.close()

@@ -88,23 +88,14 @@ class ContainerRun(Execution):
         if store is not None:
             store.begin_trial(resumed)
         if resumed is None:
-            node.emit(
-                EventKind.TRIAL_START,
-                data={
-                    'initial': [initial_label_of(node.machine)],
-                    'recovers': node.tree.recover,
-                    'settings': _settings(node),
-                    RULE: node.in_force.rule.as_data(),
-                    ORIGIN: origin_of(node.settings),
-                    INPUTS: inputs_of(node.machine.userdata),
-                },
-            )
+            first, data = EventKind.TRIAL_START, _beginning(node)
         else:
-            tell_resumed(node, resumed)
+            first, data = EventKind.RESUMED, tell_resumed(node, resumed)
+        self._is_trial = True  # from its first event on it has a last one, too
+        _running.append(node)
+        node.emit(first, data=data)
         tell_unknown_ends(node.path, node.machine.get_registered_outcomes(), node.in_force.rule)
         node.tree.control.begin_trial()
-        self._is_trial = True
-        _running.append(node)
 
     def is_over(self) -> None:
         """End, with what is noted."""
@@ -119,6 +110,8 @@ class ContainerRun(Execution):
                     self._end_trial(error)
             elif self.outcome is None:
                 self.outcome = outcome_of_early_end(node)
+                if self._store is not None:
+                    self._store.let_go()
 
     def _end_trial(self, error: Optional[BaseException]) -> None:
         node, outcome, store = self._node, self.outcome, self._store
@@ -162,6 +155,18 @@ class ContainerRun(Execution):
         if node.engine.stepped or smach.is_shutdown():  # it may come before the first state
             return TrialEnd.SHUTDOWN
         return TrialEnd.INCONSISTENT
+
+
+def _beginning(node: TreeNode) -> Dict[str, object]:
+    """Return what the TRIAL_START of a machine has."""
+    return {
+        'initial': [initial_label_of(node.machine)],
+        'recovers': node.tree.recover,
+        'settings': _settings(node),
+        RULE: node.in_force.rule.as_data(),
+        ORIGIN: origin_of(node.settings),
+        INPUTS: inputs_of(node.machine.userdata),
+    }
 
 
 def _settings(node: TreeNode) -> Dict[str, object]:
