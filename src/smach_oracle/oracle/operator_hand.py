@@ -339,7 +339,7 @@ class OperatorHand:
     def _told(self, command: str, text: str, by: str, target: str = '') -> str:
         top = self._top
         smach.loginfo('{}: {}{}: {}'.format(top.path, command, ' by ' + by if by else '', text))
-        if top.tree.trial_id:  # no event comes before the first trial, nor behind the end of one
+        if top.tree.trial_id:  # no event comes before the first one of a trial, nor behind its last
             top.emit(EventKind.OPERATOR_COMMAND, outcome=command, target=target, by=by, text=text)
         return text
 

@@ -11,8 +11,10 @@ from machines import Scripted, chain_of
 import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.control.control import Control, Engine, HeldPlace, Jump
+from smach_oracle.oracle.execution import trial
 from smach_oracle.oracle.records.events import EventKind
 
+OPERATOR_COMMAND = EventKind.OPERATOR_COMMAND
 HERE = HeldPlace('TOP', 'A')
 
 
@@ -129,6 +131,23 @@ def test_an_operator_has_a_say_in_each_trial() -> None:
         gate.opened.set()
         held.waits_before('SM_ROOT/B')
         assert second.runs == 1
+
+
+@pytest.mark.parametrize('trials', [0, 1])
+def test_a_command_as_a_trial_begins_is_no_event_of_it(
+    monkeypatch: pytest.MonkeyPatch, trials: int
+) -> None:
+    held, origin, said = Held(chain_of(Scripted('ok', 'ok'))), trial.origin_of, []
+    for _ in range(trials):
+        held.run()
+    del held.events[:]
+    monkeypatch.setattr(
+        trial, 'origin_of', lambda settings: said.append(held.hand.resume()) or origin(settings)
+    )
+    assert held.run() == 'done' and len(said) == 1
+    assert [event.seq for event in held.events] == list(range(len(held.events)))
+    assert held.events[0].kind is EventKind.TRIAL_START and not held.of(OPERATOR_COMMAND)
+    assert held.hand.pause() and not held.of(OPERATOR_COMMAND)  # as between two trials
 
 
 # -- the words of the hand

@@ -93,7 +93,7 @@ class ContainerRun(Execution):
             first, data = EventKind.RESUMED, tell_resumed(node, resumed)
         self._is_trial = True  # from its first event on it has a last one, too
         _running.append(node)
-        node.emit(first, data=data)
+        node.events.emit_first(first, node.path, data=data)
         tell_unknown_ends(node.path, node.machine.get_registered_outcomes(), node.in_force.rule)
         node.tree.control.begin_trial()
 

@@ -110,7 +110,7 @@ class Tree:
         return twin
 
     def begin_trial(self, trial_id: str) -> None:
-        """Number events and questions again."""
+        """Number events and questions again. The first event is still to come."""
         self.trial_id = trial_id
         self.trials += 1
         self.is_resumed = False
@@ -118,7 +118,7 @@ class Tree:
         self._questions = 0
         self._said.clear()
         self.classes.clear()
-        self.events.begin_trial(trial_id)
+        self.events.begin_trial(trial_id, is_silent=True)
 
     def is_new(self, *about: str) -> bool:
         """Whether something has not been said in this trial. It may come at each visit."""

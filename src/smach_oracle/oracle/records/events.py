@@ -137,12 +137,15 @@ class EventSource:
         self.begin_trial('')
         self._told: List[Observer] = []  # those that have failed, which the log has named
 
-    def begin_trial(self, trial_id: str) -> None:
-        """Number from 0 again under a new trial id."""
+    def begin_trial(self, trial_id: str, is_silent: bool = False) -> None:
+        """Number from 0 again under a new trial id.
+
+        `is_silent`: nothing is told before `emit_first`. An operator may press a button meanwhile.
+        """
         with self._lock:
             self.trial_id = trial_id
             self._seq = 0
-            self._over = False  # the trial
+            self._over = is_silent  # no trial is told of now
 
     @property
     def last_seq(self) -> int:
@@ -153,6 +156,12 @@ class EventSource:
         """Number the coming events of the trial from `seq` + 1."""
         with self._lock:
             self._seq = seq + 1
+
+    def emit_first(self, kind: EventKind, path: str, **more: Any) -> None:
+        """Tell every observer that a trial has begun. See `emit`."""
+        with self._lock:
+            self._over = False
+            self.emit(kind, path, **more)
 
     def emit(
         self,

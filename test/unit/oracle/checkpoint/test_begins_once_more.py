@@ -7,7 +7,7 @@ import pytest
 from killed_machines import in_a_process
 
 import smach
-from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle import OperatorHand, OracleContainer, oracle_of
 from smach_oracle.oracle.records.events import EventKind
 from smach_oracle.oracle.records.running_goals import GOALS
 from smach_oracle.store.store_file import StoreFile
@@ -143,3 +143,20 @@ def test_a_resumed_trial_goes_on_from_where_it_would_have(
     assert not moved and machine.execute() == 'succeeded'
     assert moved == (['LOOK', 'MOVE'] if is_earlier else ['MOVE'])
     assert [event.trial_id for event in resumed] == [trial.trial_id]
+
+
+def test_a_command_as_a_trial_resumes_is_no_event_before_resumed(tmp_path, monkeypatch):
+    assert in_a_process(lambda: wrapped(tmp_path, [], is_killed=True).execute()) is None
+    machine, told, pressed, said = wrapped(tmp_path, []), [], [], smach.logwarn
+
+    def press(text):
+        said(text)
+        if 'goes on' in text:
+            pressed.append(OperatorHand(machine).resume())
+
+    monkeypatch.setattr(smach, 'logwarn', press)
+    oracle_of(machine).events.observers.append(told.append)
+    assert machine.execute() == 'succeeded' and len(pressed) == 1
+    first = told[0]
+    assert first.kind is EventKind.RESUMED and first.seq > first.data['last_seq']
+    assert [event.seq - first.seq for event in told] == list(range(len(told)))
