@@ -49,7 +49,8 @@ class OperatorHand:
     """A person's commands for one tree of machines. Safe to use from several threads.
 
     Each command returns its effect as a sentence, and publishes it as an event. `by` is the name
-    of the operator.
+    of the operator. A machine that was unwrapped meanwhile obeys none: each raises OperatorError.
+    Wrapped once more it obeys again.
 
     >>> import smach
     >>> from smach_oracle.oracle import OperatorHand, OracleContainer
@@ -74,10 +75,22 @@ class OperatorHand:
 
         :raises TrialError: for a machine that is not under an oracle.
         """
-        node = node_of(machine)
-        if node is None:
+        if node_of(machine) is None:
             raise TrialError('{!r} is not under an oracle'.format(machine))
-        self._node = node
+        self._machine = machine
+
+    @property
+    def _node(self) -> TreeNode:
+        """Return the node of the machine, which may have been unwrapped and wrapped since.
+
+        :raises OperatorError: where it has no oracle any more.
+        """
+        node = node_of(self._machine)
+        if node is None:
+            raise OperatorError(
+                '{!r} is not under an oracle any more: it obeys no command'.format(self._machine)
+            )
+        return node
 
     @property
     def _top(self) -> TreeNode:
@@ -208,11 +221,15 @@ class OperatorHand:
 
         A refusal is logged as a warning. `state`, `by` and `written` are those of `go_to`.
         """
-        node = self._node
+        node = node_of(self._machine)
         try:
-            self.go_to(node.path, state, by, written=written)
+            self.go_to('' if node is None else node.path, state, by, written=written)
         except OperatorError as err:
-            node.warn('is not sent to {} as {} wants: {}'.format(state, by or 'a viewer', err))
+            text = 'is not sent to {} as {} wants: {}'.format(state, by or 'a viewer', err)
+            if node is None:
+                smach.logwarn(text)
+            else:
+                node.warn(text)
             return False
         return True
 

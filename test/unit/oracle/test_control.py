@@ -9,8 +9,9 @@ from held_machines import Gate, Held, eventually
 from machines import Scripted, chain_of
 
 import smach
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OperatorHand, OracleContainer, unwrap
 from smach_oracle.oracle.control.control import Control, Engine, HeldPlace, Jump
+from smach_oracle.oracle.errors import OperatorError
 from smach_oracle.oracle.execution import trial
 from smach_oracle.oracle.records.events import EventKind
 
@@ -148,6 +149,39 @@ def test_a_command_as_a_trial_begins_is_no_event_of_it(
     assert [event.seq for event in held.events] == list(range(len(held.events)))
     assert held.events[0].kind is EventKind.TRIAL_START and not held.of(OPERATOR_COMMAND)
     assert held.hand.pause() and not held.of(OPERATOR_COMMAND)  # as between two trials
+
+
+@pytest.mark.parametrize('nested', [False, True])
+def test_a_hand_from_before_holds_a_machine_that_was_wrapped_once_more(nested: bool) -> None:
+    gate, inner = Gate(), smach.StateMachine(['done', 'aborted', 'preempted'])
+    with inner:
+        smach.StateMachine.add('IN', Scripted(gate), {'ok': 'done'})
+    machine = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with machine:
+        smach.StateMachine.add('INNER', inner, {'done': 'B'})
+        smach.StateMachine.add('B', Scripted(), {'ok': 'done'})
+    OracleContainer.wrap(machine)
+    hand = OperatorHand(inner if nested else machine)
+    with Held(unwrap(machine)).begin() as held:
+        eventually(gate.entered.is_set)
+        assert hand.pause('eva') == 'SM_ROOT is paused; runs to its end: IN in SM_ROOT/INNER'
+        gate.opened.set()
+        held.waits_before('SM_ROOT/B')
+        assert hand.status() == held.hand.status()
+        hand.resume()
+        assert held.end() == 'done'
+
+
+def test_a_hand_says_that_its_machine_is_under_no_oracle_any_more() -> None:
+    held = Held(chain_of(Scripted()))
+    hand = held.hand
+    unwrap(held.machine)
+    for command in (hand.pause, hand.resume, hand.preempt, hand.step, hand.confirm, hand.status):
+        with pytest.raises(OperatorError, match='is not under an oracle any more'):
+            command()
+    assert not hand.send('A', 'eva')  # which is logged
+    OracleContainer.wrap(held.machine)
+    assert hand.pause() and hand.status().paused
 
 
 # -- the words of the hand
