@@ -28,6 +28,7 @@ from .stored_tree import StoredContainer, StoredTree
 from .structure import ChangedScript
 
 STOPPED = 'the program was stopped while it ran: nobody knows whether it was done'
+PAUSED = '{}: is paused, as before its program was stopped'
 GONE = 'the program was stopped at {}, which is not there any more'
 
 
@@ -78,7 +79,7 @@ def tell_resumed(top: TreeNode, resumption: Resumption) -> Dict[str, object]:
     for old, new in resumption.script.names.items():
         smach.logwarn('{}: goes on with {} as {}'.format(top.path, old, new))
     if top.tree.control.paused:
-        smach.logwarn('{}: is paused, as before its program was stopped'.format(top.path))
+        smach.logwarn(PAUSED.format(top.path))
     _end_goals(top, resumption)
     return {
         LAST_SEQ: resumption.seq,

@@ -28,7 +28,7 @@ from ..settings.failure_rule import FORMER_RULE, RULE, rule_in
 from ..settings.settings import GROUPS
 from .checkpointer import Checkpointer
 from .container_facts import fact_of
-from .resuming import Resumption, go_on
+from .resuming import PAUSED, Resumption, go_on
 from .stored_marks import marks_now, same_place
 from .stored_tree import StoredTree, read_tree
 from .structure import changed_script, structure_of
@@ -137,6 +137,8 @@ class TrialStore:
                         else 'the last trial was stopped before its first state',
                     )
                 )
+            if self._top.tree.pause_as_stored(tree.whole):
+                smach.logwarn(PAUSED.format(self._top.path))
             self._store.end_trial(
                 last.number, time.time(), top.label if top.phase == ENDED else RESTARTED
             )

@@ -136,9 +136,14 @@ class Tree:
         self._visits = itertools.count(visits + 1)
         self._questions = int(whole.get('questions', 0))
         self.budget.go_on(whole.get('budget'))
+        self.pause_as_stored(whole)
+
+    def pause_as_stored(self, whole: Mapping[str, Any]) -> bool:
+        """Pause a machine that was paused in a stored trial. Return whether it was."""
         paused, by = whole.get('paused') or (False, '')
         if paused:
             self.control.pause(by)
+        return bool(paused)
 
     def spent(self) -> Dict[str, Any]:
         """Return what a trial that goes on needs of what is spent or asked, as plain data."""

@@ -142,3 +142,32 @@ def test_killed_again_and_gone_back_it_is_still_paused(tmp_path):
     assert waits() is None
     assert waits(resume_from=first) is None
     assert not killed.diary.count('begins')
+
+
+@pytest.mark.parametrize('commands, is_paused', [([PAUSE], True), ([PAUSE, RESUME], False)])
+def test_a_trial_that_is_restarted_waits_before_its_first_state(tmp_path, log, commands, is_paused):
+    killed = KilledMachine(make(tmp_path / 'killed'), build)
+    killed_after(killed, *commands)
+
+    def begun(kill):
+        def work():
+            machine = Held(
+                build(Diary(killed.diary._path), Points(0)),
+                name='TOP',
+                settings=settings_of(killed, on_resume='restart'),
+            )
+            with machine.begin():
+                if is_paused:
+                    machine.waits_before('TOP/A')
+                    assert machine.hand.status().paused_by == 'ann'
+                    if kill:
+                        os.kill(os.getpid(), signal.SIGKILL)
+                    machine.hand.resume()
+                return machine.end(), [text for _, text in log if 'is paused' in text]
+
+        return in_a_process(work)
+
+    said = ['TOP: is paused, as before its program was stopped'] if is_paused else []
+    if is_paused:
+        assert begun(kill=True) is None  # and it is so once more
+    assert begun(kill=False) == ['succeeded', said]
