@@ -142,9 +142,13 @@ class StoppedTrial:
         return moments[-1].kind if moments else ''
 
     def questions(self) -> Iterator[Tuple[str, str]]:
-        """Yield path of the state and id of each question that was open."""
+        """Yield path of the state and id of each question that was open.
+
+        One that was answered by an interface is not, though it is asked again if that has not done
+        the work.
+        """
         for path, asked in sorted(self._named(ASKED)):
-            if asked:
+            if asked and asked[1]:
                 yield self._state_path(path, asked[0]), str(asked[1])
 
     def recoveries(self) -> Iterator[Tuple[str, int]]:

@@ -57,6 +57,7 @@ _COMMITTED = {
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
 # after which another state is next
 _LEADS = frozenset((EventKind.TRANSITION, EventKind.JUMP, EventKind.SENT))
+_INTERFACE = 'interface'  # the outcome of an answer that starts one, which does the state's work
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 
 
@@ -309,7 +310,9 @@ class Checkpointer:
             )
         elif kind is EventKind.QUERY_OPENED:
             yield fact_of(node.key, ASKED, [label, event.query_id])
-        elif kind in _CLOSES and self._top.tree.early_end.why is None:
+        elif kind is EventKind.QUERY_ANSWERED and event.outcome == _INTERFACE:
+            yield fact_of(node.key, ASKED, [label, ''])  # asked again unless it does the work
+        elif _closes(event) and self._top.tree.early_end.why is None:
             yield Fact(node.key, ASKED, None)
         elif not _is_on_its_way(node):
             outcome = node.site.ended_by(event)
@@ -440,6 +443,11 @@ class Checkpointer:
 def _begins_line(node: TreeNode) -> str:
     """Return the key of the outermost container around one that surely runs in its thread."""
     return direct_levels(node, at_rest=True)[-1].key
+
+
+def _closes(event: Event) -> bool:
+    """Whether a question is over: also by an interface that has done the work."""
+    return event.kind in _CLOSES or (event.kind is EventKind.INTERFACE_END and bool(event.outcome))
 
 
 def must_stop(node: TreeNode) -> bool:

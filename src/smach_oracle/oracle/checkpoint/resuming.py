@@ -301,9 +301,9 @@ class _Setting:
     def _reopen(self, record: StateRecord, stored: StoredContainer) -> None:
         """Have the question about a state, if one was open, go on as the same one."""
         asked = stored.asked
-        # one of an earlier moment may have been answered since: it is asked again
-        if asked and asked[0] == record.label and not self._resumption.is_earlier:
-            self._resumed.reopen(record, asked[1])
+        if asked and asked[0] == record.label:
+            # one of an earlier moment may have been answered since: it is asked again
+            self._resumed.reopen(record, '' if self._resumption.is_earlier else asked[1])
 
     def _go_on_in(self, node: TreeNode, stored: StoredContainer, record: StateRecord) -> None:
         """Set what is in a state that was under way, or say that it is in doubt."""

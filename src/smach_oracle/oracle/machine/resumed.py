@@ -125,7 +125,10 @@ class ResumedTrial:
         return Unfinished(FailureKind.INTERRUPTED, '', NOT_BEGUN, why, keeps=True)
 
     def reopen(self, record: StateRecord, question_id: str) -> None:
-        """Have the next question about a state be the one that was open."""
+        """Have the next question about a state be the one that was open.
+
+        `question_id`: '' where it gets a new one.
+        """
         self._questions[record] = question_id
 
     def has_question(self, record: StateRecord) -> bool:
@@ -133,7 +136,7 @@ class ResumedTrial:
         return record in self._questions
 
     def take_question(self, record: StateRecord) -> str:
-        """Return the id of the question that is open again, once, or '' where none is."""
+        """Return the id of the question that is open again, once, or '' where it has none."""
         return self._questions.pop(record, '')
 
     # -- both

@@ -222,7 +222,7 @@ def ask_expert(recovery: Recovery) -> Optional[Verdict]:
     if expert is None:
         recovery.why_no_answer = 'no expert is there to ask'
         return None
-    recovery.why_no_answer = recovery.budget.take_question()
+    recovery.why_no_answer = recovery.take_question()
     return None if recovery.why_no_answer else _ask(recovery, expert)
 
 

@@ -132,6 +132,12 @@ class Recovery:
             return 'the recovery was ended early'
         return self.budget.take_recovery(self.origin, most)
 
+    def take_question(self) -> str:
+        """Spend a question of the budget, or say why not. One that was open has spent it before."""
+        if self.node.tree.resumed.has_question(self.record):
+            return ''
+        return self.budget.take_question()
+
     def settle(self, verdict: Optional[Verdict]) -> None:
         """Count what was set aside if the machine jumps. Else the budget has it back."""
         jumps = isinstance(verdict, JumpTo)
