@@ -38,7 +38,7 @@ def decide_on_level(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     `recovery.jump_path` is the way to the place where it goes then, None where it goes nowhere.
     """
     decider, facts = _ask_at_once(recovery) or _follow_policy(recovery, why_not_above)
-    if facts.action is Action.ASK and not recovery.node.in_force.policy.asks:
+    if facts.action is Action.ASK and not recovery.may_ask:
         return decider, facts._replace(action=Action.GIVE_UP)
     return decider, facts
 

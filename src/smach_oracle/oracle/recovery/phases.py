@@ -217,7 +217,7 @@ def ask_expert(recovery: Recovery) -> Optional[Verdict]:
     """Ask the expert, and do as answered. None where nobody answers."""
     node = recovery.node
     expert = node.tree.expert
-    if not node.in_force.policy.asks:
+    if not recovery.may_ask:
         return recovery.give_up('{}: the policy asks nobody'.format(recovery.cause))
     if expert is None:
         recovery.why_no_answer = 'no expert is there to ask'
@@ -255,7 +255,7 @@ def _asked_in_words(recovery: Recovery) -> str:
     node, budget = recovery.node, recovery.budget
     if node.tree.expert is None:
         return 'nobody, since there is no expert'
-    spent = budget.why_no_question()
+    spent = recovery.why_no_question()
     if spent:
         return 'nobody, since ' + spent
     limit_s, is_cut = budget.within(node.settings.deadline_s)

@@ -132,11 +132,26 @@ class Recovery:
             return 'the recovery was ended early'
         return self.budget.take_recovery(self.origin, most)
 
+    @property
+    def _is_due(self) -> bool:
+        """Whether a person is asked whatever the policy, and it costs no question of the budget.
+
+        That is how a stored trial goes on, and a question that was open as the program was stopped.
+        """
+        return self.occasion.keeps or self.node.tree.resumed.has_question(self.record)
+
+    @property
+    def may_ask(self) -> bool:
+        """Whether a person may be asked."""
+        return self._is_due or self.node.in_force.policy.asks
+
+    def why_no_question(self) -> str:
+        """Say that the questions of the budget are spent, where one is needed."""
+        return '' if self._is_due else self.budget.why_no_question()
+
     def take_question(self) -> str:
-        """Spend a question of the budget, or say why not. One that was open has spent it before."""
-        if self.node.tree.resumed.has_question(self.record):
-            return ''
-        return self.budget.take_question()
+        """Spend a question of the budget, where one is needed, or say why not."""
+        return '' if self._is_due else self.budget.take_question()
 
     def settle(self, verdict: Optional[Verdict]) -> None:
         """Count what was set aside if the machine jumps. Else the budget has it back."""

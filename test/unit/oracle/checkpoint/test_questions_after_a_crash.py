@@ -12,7 +12,6 @@ from test_never_twice import moment_of
 from smach_oracle.oracle import Expert
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
 from smach_oracle.oracle.checkpoint.stored_tree import read_tree
-from smach_oracle.store.codecs import CODECS
 from smach_oracle.store.store_file import StoreFile
 
 ASKS = {'max_recoveries': 0}
@@ -48,7 +47,7 @@ def asked(folder):
 
 def tree_of(killed):
     with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
-        return read_tree(store, store.trials()[-1].number, CODECS)
+        return read_tree(store, store.trials()[-1].number)
 
 
 def spent(killed):

@@ -15,6 +15,7 @@ from waiting import wait_for
 import smach
 from smach_oracle.oracle import Expert, OracleContainer
 from smach_oracle.oracle.asking.question import Answer, AnswerKind
+from smach_oracle.oracle.checkpoint.stored_tree import read_tree
 from smach_oracle.store.state_command import main
 from smach_oracle.store.store_file import StoreFile
 
@@ -164,6 +165,54 @@ def test_it_is_asked_again_and_goes_on_with_the_answer(tmp_path):
     ids = [each[0] for each in questions(asked)]
     assert len(set(ids)) == 3
     assert killed.run()['events'][0][0] == 'TRIAL_START'
+
+
+# under which nobody else would be asked about a failure
+ASKS_NOBODY = [
+    {'policy': 'retry'},
+    {'policy': 'step_back'},
+    {'policy': 'restart'},
+    {'budget': {'questions': 0}},
+    {'policy': 'retry', 'budget': {'questions': 0}},
+]
+
+
+@pytest.mark.parametrize('settings', ASKS_NOBODY)
+def test_how_a_trial_goes_on_is_asked_whatever_the_policy_and_the_budget(tmp_path, settings):
+    asked = tmp_path / 'asked'
+    killed = KilledMachine(tmp_path, flat, on_resume='ask', **settings)
+    killed.run(kill_at=8)
+    for give, ended_by in ((nobody, 'kept'), (nobody, 'kept'), (same_state, 'outcome')):
+        told = killed.run(expert=Answers(asked, give))
+        assert told['ended_by'] == ended_by
+    # if B is not tried again, it fails: that costs a question, or the policy asks nobody
+    assert len(questions(asked)) == 3 and told['outcome'] in ('succeeded', 'aborted')
+    with contextlib.closing(StoreFile(killed.store, read_only=True)) as store:
+        assert read_tree(store, 1).whole['budget'][1] == 0
+
+
+@pytest.mark.parametrize('settings', ASKS_NOBODY)
+def test_a_guarded_state_that_would_begin_again_is_asked_about_as_well(tmp_path, settings):
+    asked = tmp_path / 'asked'
+    killed = KilledMachine(tmp_path, flat, states={'A': {'on_retry': 'confirm'}}, **settings)
+    killed.run(kill_at=8)
+    for give, ended_by in ((nobody, 'kept'), (same_state, 'outcome')):
+        told = killed.run(expert=Answers(asked, give), on_resume='state:A')
+        assert told['ended_by'] == ended_by
+        (said,) = [each for each in told['log'] if 'not repeated by itself: ' in each]
+        assert said.endswith(': asking an expert, 300 s')
+    assert [state for _, _, state, _, _ in questions(asked)] == ['A', 'A']
+
+
+@pytest.mark.parametrize('settings', ASKS_NOBODY)
+def test_killed_while_that_is_asked_it_is_open_again_under_its_id(tmp_path, settings):
+    asked = tmp_path / 'asked'
+    killed = KilledMachine(tmp_path, flat, on_resume='ask', **settings)
+    killed.run(kill_at=8)
+    killed.run(expert=Answers(asked, lambda *_: os.kill(os.getpid(), signal.SIGKILL)))
+    killed.run(expert=Answers(asked, same_state), on_resume='recover')
+    first, second = questions(asked)
+    assert first[0] == second[0]
 
 
 def test_killed_as_it_is_kept_it_asks_again(tmp_path):
