@@ -4,8 +4,9 @@
 AT, HISTORY, EXECUTION, STREAKS = 'at', 'history', 'execution', 'streaks'
 ASKED, ITEMS = 'asked', 'items'
 # how the names of such facts begin: of a visit, a state, the results of its ways, the mark of one
-# that has begun, a userdata key, one that was kept out
+# that has begun, a userdata key, one that was kept out, a key as it was before the first state
 VISIT, STATE, WAYS, MARK, KEY, KEPT_OUT = 'visit:', 'state:', 'ways:', 'mark:', 'key:', 'out:'
+START = 'start:'
 # of the whole tree: the id of its structure, and names that states have from then on
 STRUCTURE, RENAMED = 'structure', 'renamed'
 GOAL = 'goal:'  # and of one of the whole tree that has a goal's server

@@ -31,7 +31,15 @@ from ..records.facts import JUMPED_FROM, JUMPED_TO, TAKEN_UP
 from ..records.running_goals import GOALS
 from ..scope.scope import Reason
 from ..smach_private import data_of, states_of
-from .container_facts import ContainerFacts, KeptOut, UserdataFacts, WeakIds, fact_of, keys_of
+from .container_facts import (
+    ContainerFacts,
+    KeptOut,
+    UserdataFacts,
+    WeakIds,
+    fact_of,
+    keys_of,
+    start_facts,
+)
 from .stored_tree import StoredTree
 
 SEQ_RESERVE = 1000  # event numbers behind the last stored one that may have been used
@@ -359,6 +367,7 @@ class Checkpointer:
     def _commit(self, event: Event, node: TreeNode) -> None:
         facts = self._pending_of(node) + list(self._collected(node)) + list(self._ended_goals())
         facts += self._spent()
+        facts += self._start()
         facts += self._marks()
         self._pending_of(node).clear()
         for each in self._entered.pop(_begins_line(node), ()):
@@ -386,6 +395,14 @@ class Checkpointer:
             if self._spent_stored.get(name) != plain:
                 self._spent_stored[name] = plain
                 yield fact_of('', name, plain)
+
+    def _start(self) -> Iterator[Fact]:
+        """Yield the userdata of the start, once, where a policy may start the machine over."""
+        restarts = self._top.tree.restarts
+        if restarts.is_new:
+            restarts.is_new = False
+            for node in self._nodes.values():
+                yield from start_facts(node.key, restarts.userdata.get(node, {}))
 
     def _collected(self, node: TreeNode, all_keys: bool = False) -> Iterator[Fact]:
         """Yield what is new of a container."""

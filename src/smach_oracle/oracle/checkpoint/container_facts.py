@@ -1,5 +1,6 @@
 """The facts of one container and its userdata that are to be stored, and those that are new."""
 
+import contextlib
 import json
 import marshal
 import weakref
@@ -9,6 +10,7 @@ from typing import (
     FrozenSet,
     Iterator,
     List,
+    Mapping,
     NamedTuple,
     Optional,
     Tuple,
@@ -25,6 +27,7 @@ from smach_oracle.store.names import (
     KEPT_OUT,
     KEY,
     MARK,
+    START,
     STATE,
     STREAKS,
     VISIT,
@@ -242,6 +245,18 @@ class UserdataFacts:
             yield Fact(self._path, KEY + told, None)
         yield fact_of(self._path, KEPT_OUT + told, [kind, why])
         self._tell(KeptOut(told, kind, why, value))
+
+
+def start_facts(path: str, data: Mapping[str, object]) -> Iterator[Fact]:
+    """Yield the userdata of a container before the first state of the trial.
+
+    What cannot be stored is left out. It is named as any other such key of the container.
+    """
+    for key, value in data.items():
+        told = _told(key)
+        if told == text_of(key):
+            with contextlib.suppress(NotStorable):
+                yield Fact(path, START + told, CODECS.encode(value, lambda attribute: None))
 
 
 def _told(key: object) -> str:

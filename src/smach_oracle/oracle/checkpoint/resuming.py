@@ -188,6 +188,7 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         if stored.history:
             node.records.history.take_over((), 0, stored.history, node.has)
         node.records.streaks.take_over(stored.streaks)
+    _keep_start(top, nodes, resumption.tree)
     latest = take_over_marks(nodes, resumption.marks, resumption.is_in_doubt)
     top.tree.go_on_counting(latest, resumption.tree.whole)
     top.events.go_on_behind(resumption.seq + SEQ_RESERVE)
@@ -209,6 +210,24 @@ def go_on(top: TreeNode, resumption: Resumption) -> None:
         setting.ask_at_beginning(top, stood, stood.jumped_to or stood.label)
     else:
         setting.set_container(top)
+
+
+def _keep_start(top: TreeNode, nodes: Sequence[TreeNode], tree: StoredTree) -> None:
+    """Have the userdata of the start, to which a policy may put the machine back.
+
+    A key that is not stored has the value that the script gives it now.
+    """
+    restarts = top.tree.restarts
+    if restarts.is_due and tree.container(top.key).begun:
+        restarts.keep(
+            {
+                node: node.snapshot(
+                    {**data_of(node.machine.userdata), **tree.start.get(node.key, {})}
+                )
+                for node in nodes
+                if node.site.is_container
+            }
+        )
 
 
 def take_over_marks(nodes: Sequence[TreeNode], marks: Marks, in_doubt: bool) -> int:

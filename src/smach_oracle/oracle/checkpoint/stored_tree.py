@@ -134,10 +134,15 @@ class StoredContainer:
 
 
 class StoredTree(NamedTuple):
-    """The containers by their keys, and what belongs to the whole tree, by name."""
+    """The containers by their keys, and what belongs to the whole tree, by name.
+
+    `start`: userdata before the first state of the trial, by the keys of containers. It is stored
+    where a policy may go back to it.
+    """
 
     containers: Dict[str, StoredContainer]
     whole: Dict[str, object]
+    start: Mapping[str, Dict[str, object]] = {}
 
     @property
     def goals(self) -> Dict[str, str]:
@@ -183,6 +188,7 @@ class _Reading:
         self._tree = StoredTree({}, {})
         self._keys: Dict[str, _Values] = {}  # by path
         self._at_entry: Dict[str, Dict[str, _Values]] = {}  # by path and label
+        self._start: Dict[str, _Values] = {}  # by path
         self._visits: Dict[str, Dict[Tuple[int, int], Visit]] = {}
         self._decoded: Dict[Tuple[str, StoredValue], object] = {}  # by userdata key
 
@@ -194,7 +200,9 @@ class _Reading:
             self._note_entry(fact)
         for path, container in self._tree.containers.items():
             self._put_together(path, container)
-        return self._tree
+        # what cannot be read is said of the present value
+        start = {path: self._readable(values, {}) for path, values in self._start.items()}
+        return self._tree._replace(start=start)
 
     def _note_entry(self, fact: StoredFact) -> None:
         """Keep the userdata with which a state began, as its snapshot."""
@@ -212,6 +220,8 @@ class _Reading:
         of = name[len(word) :]  # a userdata key, or a label
         if word == names.KEY:
             self._take_key(fact, of)
+        elif word == names.START:
+            self._start.setdefault(path, {})[of] = value
         elif word == names.KEPT_OUT:
             container.missing.pop(of, None)
             if value.is_there:
@@ -260,7 +270,7 @@ class _Reading:
         self._keys.setdefault(path, {})[key] = fact.value
         # what somebody has set outlives a restore, and what a precondition has written
         if fact.kind == names.EDIT:
-            for values in entries.values():
+            for values in (*entries.values(), self._start.setdefault(path, {})):
                 values[key] = fact.value
         elif fact.kind in _AFTER_FAILURE and path == fact.moment_path:
             entries.get(fact.label, {})[key] = fact.value

@@ -136,6 +136,7 @@ class Tree:
         self._visits = itertools.count(visits + 1)
         self._questions = int(whole.get('questions', 0))
         self.budget.go_on(whole.get('budget'))
+        self.restarts.count = int(whole.get('restarts', 0))
         self.pause_as_stored(whole)
 
     def pause_as_stored(self, whole: Mapping[str, Any]) -> bool:
@@ -147,10 +148,12 @@ class Tree:
 
     def spent(self) -> Dict[str, Any]:
         """Return what a trial that goes on needs of what is spent or asked, as plain data."""
+        count = self.restarts.count
         return {
             'questions': self._questions,
             'budget': self.budget.spent(),
             'paused': [self.control.paused, self.control.paused_by],
+            **({'restarts': count} if count else {}),
         }
 
     def begin_precondition(self, node: object, state: smach.State) -> bool:

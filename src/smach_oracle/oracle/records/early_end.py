@@ -87,7 +87,8 @@ class Restarts:
     """The restarts of one trial of a tree.
 
     `count`: how often its top machine was started over. `is_due`: whether the userdata of the start
-    is wanted, and not kept yet. `userdata`: that with which containers have begun, by node.
+    is wanted, and not kept yet. `is_new`: whether it is kept, and not stored yet. `userdata`: that
+    with which containers have begun, by node.
     """
 
     def __init__(self) -> None:
@@ -97,9 +98,10 @@ class Restarts:
         """Forget the trial before. `is_wanted`: whether a policy may start this one over."""
         self.count = 0
         self.is_due = is_wanted
+        self.is_new = False
         self.userdata: Mapping[object, Dict[str, object]] = {}
 
     def keep(self, userdata: Mapping[object, Dict[str, object]]) -> None:
         """Keep snapshots of the userdata of the start."""
-        self.is_due = False
+        self.is_due, self.is_new = False, True
         self.userdata = userdata
