@@ -89,8 +89,7 @@ class OracleContainer(smach.StateMachine):
         smach.StateMachine.__init__(self, outcomes, list(input_keys), list(output_keys))
         tree = Tree(OracleContainer, recover, expert, health)
         self._oracle = TreeNode(self, tree, checked, name)
-        self._oracle.in_force.strict = strict
-        self._oracle.in_force.name_nested(checked.nested)
+        self._oracle.in_force.strict, self._oracle.in_force.nested = strict, checked.nested
 
     @classmethod
     def wrap(
@@ -112,7 +111,7 @@ class OracleContainer(smach.StateMachine):
         With `nested` (default: the setting of this name) every StateMachine inside it, at any
         depth, is wrapped too, or those at the paths of a list.
         With `recover=False` it is only observed. Wrapping again gives new
-        settings, and unwraps what `nested` does not name any more.
+        settings.
 
         >>> import smach
         >>> from smach_oracle.oracle import OracleContainer

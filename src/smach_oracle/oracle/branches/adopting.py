@@ -1,7 +1,7 @@
 """Gives the plain states of the Concurrences and Iterators of a wrapped tree their branches."""
 
 from functools import partial
-from typing import Callable, Dict, List, Optional, Tuple, cast
+from typing import Dict, List, Optional, Tuple, cast
 
 import smach
 
@@ -33,32 +33,13 @@ def adopt_branches(parent: TreeNode) -> Branching:
     return found
 
 
-def drop_branches(parent: TreeNode, is_named: Callable[[Labels], bool], names_any: bool) -> None:
-    """Take the branches below a wrapped machine out of their oracles that are not named any more.
-
-    :param is_named: whether the state to which labels lead from there is.
-    :param names_any: whether anything is, there or elsewhere.
-    """
-    for labels, container in list(branching_below(parent.machine)):
-        wrapper = wrapper_of(container)
-        if wrapper is not None and wrapper.parent is parent:
-            for label in [each for each in wrapper.branches if not is_named(labels + (each,))]:
-                del wrapper.branches[label]
-            if not names_any:
-                _release(container)
-
-
 def release_branches(machine: object) -> None:
     """Give the Concurrences and Iterators below a machine back as they were before."""
     for _, container in list(branching_below(machine)):
         if wrapper_of(container) is not None:
-            _release(container)
-
-
-def _release(container: smach.Container) -> None:
-    ask_no_more(container)
-    for mark in (WRAPPER, HOOK):
-        own_attributes(container).pop(mark, None)
+            ask_no_more(container)
+            for mark in (WRAPPER, HOOK):
+                own_attributes(container).pop(mark, None)
 
 
 def _new_wrapper(

@@ -1,12 +1,11 @@
 """Puts a machine, and those nested in it, under one oracle each, and takes them out again."""
 
-from functools import partial
 from typing import Any, Dict, List, NamedTuple, Optional
 
 import smach
 
 from ..asking.question import names
-from ..branches.adopting import adopt_branches, drop_branches, release_branches
+from ..branches.adopting import adopt_branches, release_branches
 from ..errors import SettingsError, TrialError
 from ..identity import set_class
 from ..machine.nesting import holds_containers, machines_below, nodes_of
@@ -15,17 +14,9 @@ from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, marked_node, node_of
 from ..machine.wrapped_classes import change_class, two_classes
 from ..recovery.phases import OracleState
-from ..settings.names import Nested, Strictness, is_nested_at
+from ..settings.names import Nested, Strictness
 from ..settings.settings import Settings
-from ..smach_private import (
-    Labels,
-    is_executing,
-    remappings_of,
-    remove_mark,
-    set_mark,
-    states_of,
-    transitions_of,
-)
+from ..smach_private import Labels, remappings_of, remove_mark, set_mark, states_of, transitions_of
 from .boundary import place_gates, remove_gates
 from .settings_check import check_names, check_preconditions
 
@@ -75,8 +66,7 @@ def _put_under(
 
 def _put_in_order(machine: smach.StateMachine, arguments: WrapArguments) -> None:
     top = marked_node(machine)
-    top.in_force.strict = arguments.strict
-    top.in_force.name_nested(arguments.nested)
+    top.in_force.strict, top.in_force.nested = arguments.strict, arguments.nested
     adopt(machine)
     for node in nodes_of(machine):
         node.in_force.strict = arguments.strict
@@ -124,7 +114,6 @@ def _wrap_again(
     except SettingsError:
         _configure(machine, before)
         raise
-    _drop_unnamed(top)
     return machine
 
 
@@ -171,36 +160,6 @@ def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
     if node.in_force.inherits:
         node.in_force.strict = parent.in_force.strict
     node.configure(parent.settings if node.in_force.inherits else node.settings)
-
-
-def _drop_unnamed(parent: TreeNode) -> None:
-    """Take out of a tree what no wrap of a machine around it names any more.
-
-    What runs stays as it is.
-    """
-    if is_executing(parent.machine):
-        return
-    own = [each.in_force for each in (parent, *parent.around()) if not each.in_force.inherits]
-    names_any = any(in_force.own_nested for in_force in own)
-    drop_branches(parent, partial(_is_named, parent), names_any)
-    for _, child in list(machines_below(parent.machine)):
-        node = node_of(child)
-        if node is None or node.parent is not parent or not node.site.is_container:
-            continue
-        if not node.in_force.inherits or _is_named(parent, node.labels_from_parent):
-            _drop_unnamed(node)
-        elif not is_executing(child):
-            _strip(child)
-
-
-def _is_named(parent: TreeNode, labels: Labels) -> bool:
-    """Whether the wrap of a machine around it names what these labels lead to."""
-    for each in (parent, *parent.around()):
-        in_force = each.in_force
-        if not in_force.inherits and is_nested_at(in_force.own_nested, '/'.join(labels)):
-            return True
-        labels = each.labels_from_parent + labels
-    return False
 
 
 # -- the meta state
@@ -316,8 +275,6 @@ def _stand_alone(machine: smach.StateMachine) -> None:
     for each in nodes_of(machine):
         each.join(tree)
     node.lie_below(None, ())
-    node.in_force.nested = node.in_force.own_nested
-    _drop_unnamed(node)
 
 
 def execute_bare(machine: smach.StateMachine, *args: object, **kwargs: object) -> Optional[str]:

@@ -29,7 +29,6 @@ class ContainerSettings:
         self.given_with_add: Dict[str, Dict[str, Any]] = {}  # by label
         self.strict: Strictness = True
         self.nested: Nested = True
-        self.own_nested: Nested = True  # by its own wrap, whatever the machine around it has
         self.inherits = False  # wrapped for being nested: under the settings of the top machine
         self.use(settings)
 
@@ -58,10 +57,6 @@ class ContainerSettings:
     def inherit(self, above: 'ContainerSettings') -> None:
         """Be under the settings of the top machine, for being nested."""
         self.strict, self.nested, self.inherits = above.strict, above.nested, True
-
-    def name_nested(self, nested: Nested) -> None:
-        """Say which of the machines nested in it are wrapped with it."""
-        self.nested = self.own_nested = nested
 
     def _sets(self, key: str, usual: str) -> bool:
         """Whether a setting of states is not as usual, for all or for one."""
