@@ -9,7 +9,7 @@ from typing import Iterator, List, Optional, Set, Tuple
 import smach
 from smach_oracle.store.errors import StoreDamaged, StoreError
 from smach_oracle.store.holding import MachineLock
-from smach_oracle.store.names import BROKEN, ENDED, GOAL, KEPT, RENAMED, STRUCTURE
+from smach_oracle.store.names import BEFORE, BROKEN, ENDED, GOAL, KEPT, RENAMED, STRUCTURE
 from smach_oracle.store.rows import Fact, NewMoment, StoredMoment, StoredTrial, is_in_doubt
 from smach_oracle.store.store_file import NewTrial, StoreFile
 from smach_oracle.store.store_writer import Ending, StoreWriter
@@ -23,7 +23,7 @@ from ..machine.tree_node import TreeNode
 from ..records.events import EventKind
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
-from ..settings.checks import ASK, RESTART, STATE
+from ..settings.checks import ASK, RECOVER, RESTART, STATE
 from ..settings.failure_rule import FORMER_RULE, RULE, rule_in
 from ..settings.settings import GROUPS
 from .checkpointer import Checkpointer
@@ -60,7 +60,7 @@ _CAN_GO_ON = (TrialEnd.STOPPED, TrialEnd.SHUTDOWN, TrialEnd.KEPT)
 _used: Set[Tuple[str, int]] = set()  # stores and moments of them that this program has gone on from
 BEGINS_ANEW = '{}: the stored trial of {} is over, and a new one begins: {}'
 NO_ORACLE = (
-    '{}: the trial of {} was stopped, and only an oracle goes on with the state that ran then '
+    '{}: the trial of {} was stopped, and only an oracle can find out how it goes on '
     '(recover=False, --without-oracle). Execute it with an oracle. Or say how without one: '
     'on_resume is state:LABEL or restart, or `oracle_state` drops the trial. It is kept until then'
 )
@@ -137,13 +137,15 @@ class TrialStore:
                         else 'the last trial was stopped before its first state',
                     )
                 )
-            if self._top.tree.pause_as_stored(tree.whole):
+            # in a program that has had a trial an operator may have ended it since
+            if not self._top.tree.trials and self._top.tree.pause_as_stored(tree.whole):
                 smach.logwarn(PAUSED.format(self._top.path))
             self._store.end_trial(
                 last.number, time.time(), top.label if top.phase == ENDED else RESTARTED
             )
             return self._to_resume() if top.phase == ENDED else None
-        if not self._top.tree.recover and word != STATE:
+        is_clear = word == STATE or (word == RECOVER and top.phase == BEFORE)
+        if not (self._top.tree.recover or is_clear):
             raise CheckpointError(NO_ORACLE.format(self._top.path, self._store.path))
         resumed = self._resumption(last, tree, moments, earlier)
         if resumed.script.names:

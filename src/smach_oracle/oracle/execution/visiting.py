@@ -5,7 +5,7 @@ from time import monotonic
 import smach
 
 from ..branches.wrapper import goes_on_inside
-from ..machine.repeats import note_visit, why_held_back
+from ..machine.repeats import has_visited, note_visit, why_held_back
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.userdata import UserdataGate, view_behind
@@ -55,8 +55,9 @@ def execute_watched(
     if node.in_force.deep_copy_keys:
         record.snapshot = node.snapshot()
     if node.tree.numbers_visits:
-        # what goes on where it stood is in its visit still
-        is_new = not goes_on_inside(node, record.label)
+        # what goes on where it stood is in its visit still, if it has had one
+        label = record.label
+        is_new = not (has_visited(node, label) and goes_on_inside(node, label))
         why_not = note_visit(node, record) if is_new else why_held_back(node, record)
         if why_not:
             return HeldBack(why_not)

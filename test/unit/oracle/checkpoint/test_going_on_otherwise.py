@@ -350,7 +350,7 @@ def test_without_an_oracle_no_state_is_held_back(tmp_path):
     assert observed(tmp_path, 14) is None
     assert Diary(str(tmp_path / 'diary')).count('begins')['CARRY'] == 1
     for on_resume in ('ask', 'recover'):  # as often as it is tried
-        assert 'only an oracle goes on with' in observed(tmp_path, 0, on_resume=on_resume)
+        assert 'only an oracle can find out how' in observed(tmp_path, 0, on_resume=on_resume)
     assert observed(tmp_path, 0, on_resume='state:POUR') == 'succeeded'
     assert Diary(str(tmp_path / 'diary')).count('begins') == {'LOOK': 1, 'POUR': 2, 'CARRY': 2}
 
