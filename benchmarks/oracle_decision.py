@@ -30,12 +30,13 @@ GROWTH_LIMIT = 1.5
 # of 58 ns. That is missed. A precondition has a thread of its own since, so that a stop can leave
 # it behind: to wake that thread, and to be woken by it, takes 600 to 900 of them. The same code
 # takes 1420 to 1780 in one process and the next where a bare step takes 58 ns. Where that took
-# 42 ns, it took a third more, so the limit is above both
-AIM, LIMIT = 650.0, 2600.0
+# 42 ns, it took a third more. On a processor that is slower at code that it executes once, it took
+# 2180 to 2660 of 54 ns (by ways 3280, learning 5200). The limits are a tenth above that
+AIM, LIMIT = 650.0, 2900.0
 # of a policy that goes by ways, which makes a menu: 2190 to 2310, likewise
-LIMIT_BY_WAYS = 3700.0
+LIMIT_BY_WAYS = 3900.0
 # of one that also counts 120 results of its ways: 3620 to 3760, likewise
-LIMIT_LEARNING = 5600.0
+LIMIT_LEARNING = 5900.0
 ROUNDS = 15
 MACHINES = 4  # with many visits, at most: one that meets a busy moment is no measure
 FAILURES = 300
