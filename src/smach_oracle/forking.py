@@ -25,7 +25,7 @@ _of_functions: List[Decision] = []
 _of_objects: Dict[Tuple[int, str], Tuple['weakref.ref[object]', Callable[[Any], None]]] = {}
 _masks: Dict[int, Set[int]] = {}  # of threads that fork now, as they were before
 _forked = False
-process = os.getpid()  # this one: the operating system takes longer to say so
+process = os.getpid()  # id of this process, kept since each execution of a container asks for it
 
 
 def in_child(decision: Decision) -> None:

@@ -19,7 +19,7 @@ from smach_oracle.analysis.lasting.tries import StateTry, tries_of
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.truth import TRUTH_FILE, read_truth
 from smach_oracle.oracle.records.events import Event, EventKind
-from smach_oracle.oracle.records.facts import STOPPING
+from smach_oracle.oracle.records.facts import is_counted
 from smach_oracle.oracle.records.rates_format import write_learned
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 
@@ -292,9 +292,8 @@ def _was_stopped(events: Sequence[Event]) -> bool:
     """Whether the top machine was preempted, or a state of it ended at a shutdown."""
     return any(
         event.kind == EventKind.PREEMPT
-        or (
-            event.kind == EventKind.TRANSITION and not event.text and event.data == STOPPING['data']
-        )
+        # the others that are not counted say why in their text
+        or (event.kind == EventKind.TRANSITION and not event.text and not is_counted(event))
         for event in events
         if event.path == events[0].path
     )

@@ -221,11 +221,11 @@ class OperatorHand:
 
         A refusal is logged as a warning. `state`, `by` and `written` are those of `go_to`.
         """
-        node = node_of(self._machine)
         try:
-            self.go_to('' if node is None else node.path, state, by, written=written)
+            self.go_to(self._node.path, state, by, written=written)
         except OperatorError as err:
             text = 'is not sent to {} as {} wants: {}'.format(state, by or 'a viewer', err)
+            node = node_of(self._machine)
             if node is None:
                 smach.logwarn(text)
             else:

@@ -22,6 +22,7 @@ from smach_oracle.store.names import ASKED, AT, BEFORE, BROKEN, ENDED, FAILED, G
 from smach_oracle.store.rows import Fact, NewMoment
 from smach_oracle.store.store_writer import StoreWriter
 
+from ..asking.question import AnswerKind
 from ..branches.wrapper import goes_on_inside, wrappers_around
 from ..machine.nesting import nodes_of
 from ..machine.places import TreePlace, direct_levels
@@ -65,7 +66,8 @@ _COMMITTED = {
 _CLOSES = frozenset((EventKind.QUERY_ANSWERED, EventKind.QUERY_EXPIRED, EventKind.QUERY_CANCELLED))
 # after which another state is next
 _LEADS = frozenset((EventKind.TRANSITION, EventKind.JUMP, EventKind.SENT))
-_INTERFACE = 'interface'  # the outcome of an answer that starts one, which does the state's work
+# outcome of the event of an answer that starts an interface, which does the state's work
+_INTERFACE = AnswerKind.INTERFACE.name.lower()
 _HAS_RUN = frozenset((EventKind.TRANSITION, EventKind.FAILURE))
 
 

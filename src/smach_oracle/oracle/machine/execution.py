@@ -66,8 +66,6 @@ class Execution:
         Return whether it still may.
         """
         runs = self.runs_around = runs_around(self._node)
-        if not runs:
-            return self._node.tree.scope.cancelled is None
         for run in runs:
             run.tell(self._node.engine)
         return not self.is_left_behind()
