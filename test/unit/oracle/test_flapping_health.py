@@ -20,8 +20,9 @@ def tell_nobody(kind, **fields):
 
 
 @pytest.fixture
-def clock():
-    """The clock of the waits, in which only pauses take time."""
+def clock(monkeypatch):
+    """The clock of the waits, in which only pauses take time, and the same ones in each run."""
+    monkeypatch.setattr(random, 'uniform', random.Random(5).uniform)
     return FakeClock(100.0003)
 
 
