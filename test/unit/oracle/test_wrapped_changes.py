@@ -323,3 +323,27 @@ def test_a_jump_into_a_machine_arrives_though_it_was_wrapped_again_on_the_way():
     machine.machine.events.observers.append(wrap_again)
     assert machine.run() == 'done'
     assert machine.visits() == ['PICK', 'B', 'C', 'PLACE', 'PICK', 'C', 'PLACE']
+
+
+@pytest.mark.parametrize('outer_has', [False, True])
+def test_a_machine_that_comes_below_another_brings_what_that_one_has_not(outer_has):
+    said, inners = [], FakeExpert(supersede('ok'))
+
+    def health(who):
+        return lambda: said.append(who) is None
+
+    inner = OracleContainer.wrap(
+        chain_of(Scripted('aborted')),
+        settings={'policy': 'always_ask', 'healthy': {'settle_s': 0.0}},
+        expert=inners,
+        health=health('inner'),
+    )
+    outer = smach.StateMachine(['done', 'aborted', 'preempted'])
+    with outer:
+        smach.StateMachine.add('INNER', inner)
+    given = dict(expert=FakeExpert(supersede('ok')), health=health('outer'))
+    OracleContainer.wrap(outer, **(given if outer_has else {}))
+    assert outer.execute() == 'done'
+    assert set(said) == {'outer' if outer_has else 'inner'}
+    assert len(outer.expert.questions) == 1
+    assert (outer.expert is inners) != outer_has

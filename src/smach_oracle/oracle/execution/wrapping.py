@@ -105,10 +105,8 @@ def _wrap_again(
             remove_oracle(node)
         top.tree.recover = tree.recover
         top.take_name(arguments.name)
-        if tree.expert is not None:
-            top.tree.expert = tree.expert
-        if tree.health.given is not None:
-            top.tree.health.given = tree.health.given
+        tree.take_over(top.tree)  # what is not given anew stays
+        top.tree.expert, top.tree.health.given = tree.expert, tree.health.given
         _configure(machine, arguments.settings)
         _put_in_order(machine, arguments)
     except SettingsError:
@@ -155,6 +153,8 @@ def _move_below(node: TreeNode, parent: TreeNode, below: Labels) -> None:
     It may have been on its own, or below another machine, before.
     """
     remove_oracle(node)  # it may go by another name here, or not be wanted
+    if node.parent is None:
+        parent.tree.take_over(node.tree)
     node.lie_below(parent, below)
     node.join(parent.tree)
     if node.in_force.inherits:

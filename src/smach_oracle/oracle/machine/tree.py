@@ -99,6 +99,13 @@ class Tree:
         self.departures_lock = threading.Lock()
         self._lock = threading.Lock()
 
+    def take_over(self, other: 'Tree') -> None:
+        """Ask the expert and the health function of another tree, where this one has none."""
+        if self.expert is None:
+            self.expert = other.expert
+        if self.health.given is None:
+            self.health.given = other.health.given
+
     def is_parents(self) -> bool:
         """Whether this is a child process of the program to which the tree belongs."""
         return self.process != forking.process and forking.is_child()
