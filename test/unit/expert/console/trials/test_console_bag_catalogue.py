@@ -181,7 +181,8 @@ def test_long_trials_are_cut_and_too_large_ones_refused(folder, monkeypatch):
 def test_one_that_a_recorder_writes_is_left_alone(tmp_path):
     recorder = TrialRecorder(str(tmp_path), warn=pytest.fail)
     FakeMachine(recorder).emit(EventKind.TRIAL_START)
-    active = wait_for(lambda: list(tmp_path.glob('*.bag.active')))
+    # its recorder locks it before it writes to it
+    active = wait_for(lambda: [bag for bag in tmp_path.glob('*.bag.active') if bag.stat().st_size])
     os.utime(str(active[0]), (1, 1))
     catalogue, section = catalogue_of(str(tmp_path))
     assert not section()['broken'] and not section()['trials']
