@@ -22,7 +22,7 @@ from smach_oracle.oracle.settings.failure_rule import FailureRule
 from .bag_events import BagError, EventReader, SkippedBag
 from .counting.bag_counts import count_bags
 from .counting.counted_bag import Counting
-from .counting.trial_summary import TrialSummary, summarise
+from .counting.trial_summary import TrialSummary
 from .counting.trials_of_bags import TrialOfBags, trials_of
 from .reading import bags_in, read_bags
 from .truth import TruthFiles
@@ -166,21 +166,25 @@ def load_replicates(
 ) -> Dict[str, List[List[Event]]]:
     """Return the trials with an oracle, by the folder they were recorded in, in order.
 
-    Bags that cannot be used go to `skipped`.
+    Bags that cannot be used go to `skipped`, and so do trials that lack events.
 
     :raises BagError: where there are none, or no folder.
     """
     found: Dict[str, List[List[Event]]] = {}
-    for path, content in read_bags(places, skipped):
-        trials: Dict[str, List[Event]] = {}
-        for event in content.events:
-            trials.setdefault(event.trial_id, []).append(event)
-        for events in trials.values():
-            summary = summarise(events, (path,))
-            if summary.recovers and not summary.lost_events:
-                found.setdefault(summary.replicate, []).append(
-                    sorted(events, key=lambda event: event.seq)
+    for trial in trials_of(dict(read_bags(places, skipped))):
+        summary = trial.summary(None)
+        lost = summary.lost_events
+        if lost and summary.recovers is not False:
+            skipped.append(
+                SkippedBag(
+                    summary.bags[0],
+                    'trial {}: {} of its events {} lost, or in a bag that is not here'.format(
+                        summary.trial_id, lost, 'is' if lost == 1 else 'are'
+                    ),
                 )
+            )
+        elif summary.recovers:
+            found.setdefault(summary.replicate, []).append(trial.events)
     return {
         folder: sorted(trials, key=lambda events: events[0].wall_time)
         for folder, trials in found.items()
