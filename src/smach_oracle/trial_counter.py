@@ -57,7 +57,7 @@ class TrialCounter:
         self._failures: Dict[str, int] = defaultdict(int)
         self._asked: Set[str] = set()
         self._answered: Set[str] = set()
-        # by container: whether its last decision is a recovery that no jump has carried out yet
+        # by 'PATH/STATE': whether its last decision is a recovery that no jump has carried out yet
         self._decided: Dict[str, bool] = {}
         self._oracle_seen = False
         self._state_seen = False
@@ -207,12 +207,12 @@ class TrialCounter:
 
     def _count_failure(self, event: Event) -> None:
         if event.failure_kind != FailureKind.INTERRUPTED:
-            self._failures['{}/{}'.format(event.path, event.state)] += 1
-        self._decided[event.path] = False
+            self._failures[_state_of(event)] += 1
+        self._decided[_state_of(event)] = False
 
     def _count_question(self, event: Event) -> None:
         self._asked.add(event.query_id)
-        self._decided[event.path] = False
+        self._decided[_state_of(event)] = False
 
     def _count_answer(self, event: Event) -> None:
         self._answered.add(event.query_id)
@@ -236,20 +236,21 @@ class TrialCounter:
             self._unwell_since_s = None
 
     # A decision to revisit, step back or start over is counted once it is carried out. The next
-    # JUMP of the same container carries it out, or one that comes from there. A failure or a
-    # question in between replaces it.
+    # JUMP from its state does that, or one of a container above that comes from there. A failure of
+    # the state or a question about it in between replaces it. Branches of a Concurrence have a path
+    # in common, and may decide at the same time.
 
     def _count_decision(self, event: Event) -> None:
         self._oracle_seen = True
-        self._decided[event.path] = event.outcome in AUTONOMOUS_DECISIONS
+        self._decided[_state_of(event)] = event.outcome in AUTONOMOUS_DECISIONS
 
     def _count_give_up(self, event: Event) -> None:
-        self._decided[event.path] = False
+        self._decided[_state_of(event)] = False
 
     def _count_jump(self, event: Event) -> None:
-        self._recoveries += self._decided.pop(event.path, False)
+        self._recoveries += self._decided.pop(_state_of(event), False)
         left = event.data.get(JUMPED_FROM, '') if isinstance(event.data, Mapping) else ''
-        self._recoveries += self._decided.pop(str(left).rpartition('/')[0], False)
+        self._recoveries += self._decided.pop(str(left), False)
 
     def _was_stopped(self, end: Event) -> bool:
         """Whether a shutdown or Ctrl-C ended it.
@@ -273,6 +274,10 @@ class TrialCounter:
         EventKind.GIVE_UP: _count_give_up,
         EventKind.JUMP: _count_jump,
     }
+
+
+def _state_of(event: Event) -> str:
+    return '{}/{}'.format(event.path, event.state)
 
 
 def _experiment(event: Event) -> str:

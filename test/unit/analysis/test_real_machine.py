@@ -3,6 +3,7 @@ the machine did.
 """
 
 import socket
+import threading
 
 import pytest
 
@@ -10,7 +11,7 @@ import smach
 from smach_oracle import __version__
 from smach_oracle.analysis.trial_counter import TrialEnding
 from smach_oracle.analysis.trials import load_trials
-from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.asking.question import Answer, AnswerKind, Expert
 from smach_oracle.ros.recorder import TrialRecorder
 
@@ -18,9 +19,9 @@ from smach_oracle.ros.recorder import TrialRecorder
 class Pick(smach.State):
     """Fails as often as told, then succeeds."""
 
-    def __init__(self):
+    def __init__(self, failures=0):
         super().__init__(outcomes=['succeeded', 'aborted'])
-        self.failures = 0
+        self.failures = failures
 
     def execute(self, userdata):
         self.failures -= 1
@@ -36,6 +37,20 @@ class FakeExpert(Expert):
     def ask(self, question, cancelled, progress):
         if not self.answers:
             return None
+        return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='fake')
+
+
+class Meeting(Expert):
+    """Who waits, and who is asked: each goes on once the other has come as far."""
+
+    def __init__(self):
+        self._both = threading.Barrier(2, timeout=20.0)
+
+    def wait(self, seconds, what, scope):
+        self._both.wait()
+
+    def ask(self, question, cancelled, progress):
+        self._both.wait()
         return Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='fake')
 
 
@@ -112,3 +127,35 @@ def test_without_the_oracle_a_failure_ends_the_trial(tmp_path):
         not any(trial.recovers for trial in trials)
         and sum(trial.recoveries for trial in trials) == 0
     )
+
+
+@pytest.mark.parametrize('asks, recoveries, questions', [(False, 2, 0), (True, 1, 1)])
+def test_branches_that_are_recovered_at_the_same_time_all_count(
+    asks, recoveries, questions, tmp_path
+):
+    both = smach.Concurrence(
+        ['succeeded', 'aborted'],
+        default_outcome='aborted',
+        outcome_map={'succeeded': {'A': 'succeeded', 'B': 'succeeded'}},
+    )
+    with both:
+        for label in ('A', 'B'):
+            smach.Concurrence.add(label, Pick(failures=1))
+    machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
+    with machine:
+        smach.StateMachine.add('BOTH', both)
+    meeting = Meeting()
+    states = {'BOTH/B': {'max_recoveries': 0}} if asks else {}
+    OracleContainer.wrap(
+        machine,
+        name='TOP',
+        expert=meeting,
+        settings={'policy': {'name': 'ladder', 'wait_s': 1.0}, 'states': states},
+    )
+    oracle_of(machine).waiting = meeting
+    recorder = TrialRecorder(str(tmp_path), warn=pytest.fail)
+    recorder.attach(machine)
+    assert machine.execute() == 'succeeded'
+    assert recorder.close(20.0)
+    (trial,) = load_trials([str(tmp_path)]).trials
+    assert (trial.failures, trial.recoveries, trial.questions) == (2, recoveries, questions)

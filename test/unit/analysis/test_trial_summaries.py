@@ -40,7 +40,7 @@ JUMP = (EventKind.JUMP, {'state': 'PICK', 'target': 'PICK'})
 
 
 def opened(query_id):
-    return EventKind.QUERY_OPENED, {'query_id': query_id}
+    return EventKind.QUERY_OPENED, {'state': 'PICK', 'query_id': query_id}
 
 
 def answered(query_id, outcome='supersede'):
@@ -136,7 +136,7 @@ def test_decisions_of_containers_side_by_side_are_kept_apart():
             START,
             REVISIT,
             (EventKind.DECISION, dict(ASK[1], **inner)),
-            (opened('q')[0], dict(query_id='q', **inner)),
+            (opened('q')[0], dict(opened('q')[1], **inner)),
             JUMP,
             (EventKind.JUMP, inner),
             END,

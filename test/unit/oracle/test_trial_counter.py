@@ -82,6 +82,26 @@ DECIDED, JUMP = EventKind.DECISION, EventKind.JUMP
             ],
             1,
         ),
+        (
+            [
+                step(DECIDED, outcome='revisit'),
+                step(EventKind.FAILURE, state='B'),
+                step(DECIDED, state='B', outcome='revisit'),
+                step(JUMP),
+                step(JUMP, state='B'),
+            ],
+            2,
+        ),
+        (
+            [
+                step(DECIDED, outcome='revisit'),
+                step(DECIDED, state='B', outcome='ask'),
+                step(EventKind.QUERY_OPENED, state='B'),
+                step(JUMP),
+            ],
+            1,
+        ),
+        ([step(DECIDED, outcome='revisit'), step(JUMP, state='B'), step(EventKind.GIVE_UP)], 0),
     ],
 )
 def test_a_recovery_is_a_decision_of_the_oracle_that_is_carried_out(steps, recoveries):
