@@ -23,8 +23,8 @@ def recorded_trials(
 ) -> List[ObservedTrial]:
     """Return the trials of a bag, or of all bags in a folder, by the time of their beginning.
 
-    Bags that are still written are left out. An exception that ended a trial is a RuntimeError with
-    its text.
+    The bags of a trial are joined by its id. Bags that are still written are left out. An
+    exception that ended a trial is a RuntimeError with its text.
 
     :param failing_outcomes: those that are failures. None means by the rule that each trial names.
     :raises OSError: where there is no such bag or folder.
@@ -33,22 +33,22 @@ def recorded_trials(
     place = Path(path)
     bags = sorted(place.glob('*.bag')) if place.is_dir() else [place]
     failing = None if failing_outcomes is None else FailingNames(failing_outcomes)
-    trials = [trial for bag in bags for trial in _trials_in(bag, failing)]
+    by_trial: Dict[str, Dict[int, Event]] = {}  # events by their numbers
+    for bag in bags:
+        for event in _events_in(bag):
+            by_trial.setdefault(event.trial_id, {})[event.seq] = event
+    trials = [
+        _trial_of([by_number[seq] for seq in sorted(by_number)], failing)
+        for by_number in by_trial.values()
+    ]
     return sorted(trials, key=lambda trial: trial.events[0].wall_time)
 
 
-def _trials_in(path: Path, failing: Optional[FailingNames]) -> List[ObservedTrial]:
-    events: List[Event] = []
+def _events_in(path: Path) -> List[Event]:
     with rosbag.Bag(str(path)) as bag:
         topics = [topic for topic in bag.get_type_and_topic_info()[1] if topic.endswith(_EVENTS)]
-        if topics:
-            events = [_event_of(message) for _, message, _ in bag.read_messages(topics)]
-    by_trial: Dict[str, List[Event]] = {}
-    for event in events:
-        by_trial.setdefault(event.trial_id, []).append(event)
-    return [
-        _trial_of(sorted(each, key=lambda event: event.seq), failing) for each in by_trial.values()
-    ]
+        messages = bag.read_messages(topics) if topics else ()
+        return [_event_of(message) for _, message, _ in messages]
 
 
 def _trial_of(events: List[Event], failing: Optional[FailingNames]) -> ObservedTrial:

@@ -1,66 +1,14 @@
 """A trial counts once for `learn` and `compare what_if`, whatever number of bags it is in."""
 
-import contextlib
 import shutil
 
 import pytest
-from failing_machines import KEPT, NoWait, record, run
+from failing_machines import KEPT, record, run
+from resumed_trial import record_resumed_trial
 
-import smach
 from smach_oracle.analysis import what_if
 from smach_oracle.analysis.learning import command
-from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.records.events import EventKind
-from smach_oracle.ros.recorder import TrialRecorder
-
-
-class FailsOnce(smach.State):
-    def __init__(self):
-        super().__init__(outcomes=['succeeded', 'aborted'])
-        self.has_failed = False
-
-    def execute(self, userdata):
-        failed, self.has_failed = self.has_failed, True
-        return 'succeeded' if failed else 'aborted'
-
-
-class Carries(smach.State):
-    def __init__(self, stops):
-        super().__init__(outcomes=['succeeded'])
-        self.stops = stops
-
-    def execute(self, userdata):
-        if self.stops:
-            raise KeyboardInterrupt
-        return 'succeeded'
-
-
-def run_program(folder, stops):
-    """Run a trial, or go on with the one that was stopped. GRASP and PLACE fail once each."""
-    machine = smach.StateMachine(outcomes=['succeeded', 'aborted'])
-    with machine:
-        smach.StateMachine.add('GRASP', FailsOnce(), {'succeeded': 'CARRY'})
-        smach.StateMachine.add('CARRY', Carries(stops), {'succeeded': 'PLACE'})
-        smach.StateMachine.add('PLACE', FailsOnce())
-    store = {'file': str(folder / 'robot.db'), 'on_resume': 'recover'}
-    OracleContainer.wrap(
-        machine, name='TOP', settings={'policy': 'escalating', 'checkpoint': store}
-    )
-    oracle_of(machine).waiting = NoWait()
-    recorder = TrialRecorder(str(folder / 'bags'), warn=pytest.fail)
-    recorder.attach(oracle_of(machine))
-    with contextlib.suppress(KeyboardInterrupt):
-        machine.execute()
-    assert recorder.close(20.0)
-
-
-@pytest.fixture
-def resumed(tmp_path):
-    """A folder with the two bags of a trial whose program was stopped, and went on."""
-    run_program(tmp_path, True)
-    run_program(tmp_path, False)
-    assert len(list((tmp_path / 'bags').glob('*.bag'))) == 2
-    return tmp_path / 'bags'
 
 
 def learned(capsys, folder, code=0):
@@ -80,7 +28,8 @@ def tried(capsys, folder, code=0):
     return [(int(row[2]), int(row[-1])) for row in rows], err
 
 
-def test_a_trial_that_went_on_in_another_bag_teaches_all_that_happened_in_it(resumed, capsys):
+def test_a_trial_that_went_on_in_another_bag_teaches_all_that_happened_in_it(tmp_path, capsys):
+    resumed = record_resumed_trial(tmp_path)
     told = '# TOP: 1 trials, 2 results of ways from failures of 2 states'
     assert learned(capsys, resumed) == (told, '')
     assert command.main([str(resumed), '--explain', 'PLACE']) == 0
