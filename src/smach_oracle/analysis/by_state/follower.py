@@ -13,6 +13,8 @@ from .recoveries import FollowedWay, Recoveries
 from .state_counts import Reason, StatesOfTrials
 
 _KINDS = {int(each): each.name.lower() for each in FailureKind}
+# each leaves a failed state: the machine goes on
+_LEAVES = (EventKind.JUMP, EventKind.GIVE_UP, EventKind.SUPERSEDE)
 _ENDED_WELL = {TrialEnding.SUCCESS: True, TrialEnding.FAILURE: False}
 
 
@@ -137,4 +139,4 @@ def reason_of(failure: Event) -> Reason:
 
 
 def _left_by(event: Event) -> Optional[Key]:
-    return left_by(event) if event.kind in (EventKind.JUMP, EventKind.GIVE_UP) else None
+    return left_by(event) if event.kind in _LEAVES else None

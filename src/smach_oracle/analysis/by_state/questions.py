@@ -25,7 +25,7 @@ class Questions:
         self._answered: Dict[Key, str] = {}  # by state: a question after which nothing went on yet
 
     def take(self, event: Event, now_s: float, left: Optional[Key]) -> None:
-        """Follow an event. `left`: the state that a JUMP or a GIVE_UP leaves, None at others."""
+        """Follow an event. `left`: the failed state from which the machine goes on, or None."""
         query = event.query_id
         if event.kind == EventKind.QUERY_OPENED:
             self._answered.pop(key_of(event), None)

@@ -8,6 +8,7 @@ from smach_oracle.oracle.records.facts import JUMPED_TO
 
 from ..replaying.followed import (
     Decisions,
+    GoneWay,
     Key,
     Visits,
     entered_way,
@@ -61,11 +62,14 @@ class Recoveries:
         self._prepared: Set[Key] = set()  # preconditions were run after the decision
         # that the expert chose, by state: the name, and when
         self._interfaces: Dict[Key, Tuple[str, float]] = {}
+        # states whose work the expert did: a JUMP that follows at once is where its outcome leads
         self._superseded: Set[Key] = set()
 
     def take(self, event: Event, now_s: float) -> None:
         """Follow an event."""
         key = key_of(event)
+        is_outcome = key in self._superseded
+        self._superseded.discard(key)
         ends, succeeded = self._visits.take(event)
         if ends:
             self._settle(now_s, succeeded, [each for each in self._going if each.watched == key])
@@ -87,10 +91,9 @@ class Recoveries:
             self._supersede(event, now_s)
         elif event.kind != EventKind.JUMP and is_act_of_person(event):
             self._settle(now_s, None, list(self._going))
-        if event.kind == EventKind.JUMP:
-            self._jump(event, now_s)
-        else:
-            self._decisions.take(event)
+        gone = self._decisions.take(event)
+        if event.kind == EventKind.JUMP and not is_outcome:
+            self._jump(event, gone, now_s)
 
     def end(self, now_s: float, succeeded: Optional[bool]) -> None:
         """End with the trial. `succeeded`: None where its end says neither."""
@@ -127,13 +130,9 @@ class Recoveries:
         watched = event.path, event.target
         self._go(key, words, now_s, watched, by_expert=True, since_s=since_s)
 
-    def _jump(self, event: Event, now_s: float) -> None:
-        gone = self._decisions.take(event)
+    def _jump(self, event: Event, gone: Optional[GoneWay], now_s: float) -> None:
         data = event.data if isinstance(event.data, Mapping) else {}
         key = left_by(event)
-        if key in self._superseded:
-            self._superseded.discard(key)
-            return
         way = entered_way(event, key, str(data.get(JUMPED_TO, '')))
         if gone is not None:
             key, way = gone.key, gone.way
