@@ -158,6 +158,39 @@ def test_an_interface_after_which_the_question_is_put_again_was_in_vain():
     assert found.expert_s == 3.0, 'nobody claimed it: from its opening to the end of the interface'
 
 
+CLAIMED, RELEASED = EventKind.QUERY_CLAIMED, EventKind.QUERY_RELEASED
+
+
+@pytest.mark.parametrize(
+    'claims, outcome, expert_s',
+    [
+        ([], 'goto', 1.0),  # from its opening
+        ([CLAIMED], 'goto', 1.0),
+        ([CLAIMED, RELEASED], 'goto', 1.0),  # by somebody who never claimed it
+        ([CLAIMED, RELEASED, CLAIMED], 'goto', 2.0),
+        ([CLAIMED, CLAIMED], 'goto', 2.0),  # taken over
+        ([CLAIMED, CLAIMED, RELEASED], 'goto', 2.0),
+        ([CLAIMED, RELEASED], 'interface', 2.0),  # and the interface
+        ([], 'interface', 2.0),
+    ],
+)
+def test_the_expert_works_while_a_question_is_claimed(claims, outcome, expert_s):
+    question = {'query_id': 'q'}
+    found = states_of(
+        story(
+            (EventKind.STATE_START, {}),
+            (EventKind.FAILURE, {'failure_kind': FailureKind.FELL_THROUGH}),
+            (EventKind.QUERY_OPENED, question),
+            *[(kind, question) for kind in claims],
+            (EventKind.QUERY_ANSWERED, {'query_id': 'q', 'outcome': outcome}),
+            (EventKind.INTERFACE_END, question),
+            (EventKind.TRIAL_END, {'state': ''}),
+        )
+    )
+    assert found.expert_s == expert_s
+    assert found.times.to_claim == ([1.0] if claims else [])
+
+
 def test_the_clock_stands_still_while_the_program_does_not_run():
     found = states_of(
         story((EventKind.STATE_START, {}), (EventKind.RESUMED, {}), (EventKind.TRIAL_END, {}))

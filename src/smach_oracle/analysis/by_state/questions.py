@@ -35,6 +35,7 @@ class Questions:
             if query in self._opened_s and query not in self._claimed:
                 self._claimed.add(query)
                 self._found.times.to_claim.append(now_s - self._opened_s[query])
+            self._end_work(query, now_s)  # of somebody from whom it was taken over
             self._busy_s[query] = now_s
         elif event.kind == EventKind.QUERY_RELEASED:
             self._end_work(query, now_s)
@@ -62,7 +63,7 @@ class Questions:
             return  # its opening is in no bag, or it was answered before
         opened_s = self._opened_s[query]
         self._found.times.to_answer.append(now_s - opened_s)
-        self._busy_s.setdefault(query, opened_s)
+        self._busy_s.setdefault(query, now_s if query in self._claimed else opened_s)
         if event.outcome != INTERFACE:
             self._end_work(query, now_s)
         self._close(query, event.outcome)
