@@ -86,3 +86,27 @@ def test_the_robot_goes_on_as_the_work_of_the_expert_ends_the_container():
         )
     )
     assert found.times.to_resume == [2.0]
+
+
+def test_a_way_belongs_to_the_level_whose_oracle_decided_it(tmp_path):
+    arm = machine_with(('GRASP', Scripted('aborted', 'aborted')))
+    machine = smach.StateMachine(ALL)
+    with machine:
+        smach.StateMachine.add('LOOK', Scripted(), {'succeeded': 'ARM'})
+        smach.StateMachine.add('ARM', arm)
+    states = {'GRASP': {'moderate_from': 0.1}}
+    settings = {'policy': 'algorithm1', 'tree': {'escalate': True}, 'states': states}
+    trials, counts = recorded(tmp_path, machine, settings=settings)
+    assert [(row.state, row.decision, row.way, row.helped) for row in trials.decisions()] == [
+        ('TOP/ARM/GRASP', 'step_back', 'trying it again', False),
+        ('TOP/ARM/GRASP', 'ask', '', None),
+        ('TOP/ARM', 'step_back', 'going back to LOOK', True),
+    ]
+    assert [(row.state, row.way) for row in trials.failures()] == [
+        ('TOP/ARM/GRASP', 'trying it again'),
+        ('TOP/ARM/GRASP', ''),
+        ('TOP/ARM', 'going back to LOOK'),
+    ]
+    grasp, around = counts.states['TOP/ARM/GRASP'], counts.states['TOP/ARM']
+    assert (grasp.not_recovered, ways_of(grasp)) == (1, {'trying it again': (0, 1, 0)})
+    assert (around.not_recovered, ways_of(around)) == (0, {'going back to LOOK': (1, 0, 0)})

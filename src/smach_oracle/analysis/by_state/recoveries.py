@@ -132,25 +132,32 @@ class Recoveries:
 
     def _jump(self, event: Event, gone: Optional[GoneWay], now_s: float) -> None:
         data = event.data if isinstance(event.data, Mapping) else {}
-        key = left_by(event)
-        way = entered_way(event, key, str(data.get(JUMPED_TO, '')))
+        by_expert = is_act_of_person(event)
         if gone is not None:
             key, way = gone.key, gone.way
-        elif key in self._prepared and way == WayKind.AGAIN.value:
-            way = WayKind.PREPARE.value
-        by_expert = is_act_of_person(event)
-        decision = None
+            decision = None if gone.decision is None else gone.decision.seq
+        else:
+            key, decision = (left_by(event), None) if by_expert else self._decider_of(event)
+            way = entered_way(event, key, str(data.get(JUMPED_TO, '')))
+            if key in self._prepared and way == WayKind.AGAIN.value:
+                way = WayKind.PREPARE.value
         if by_expert:
             self._settle(now_s, None, list(self._going))
-        elif gone is not None and gone.decision is not None:
-            decision = gone.decision.seq
-        else:
-            decision = self._decided.pop(key, self._decided.pop(key_of(event), None))
         words = way_in_words(way)
         name, since_s = self._interfaces.pop(key, ('', None))
         if by_expert:
             words = _INTERFACE + name if name else EXPERT + words.replace('going back', 'going')
         self._go(key, words, now_s, key, by_expert, since_s, decision)
+
+    def _decider_of(self, jump: Event) -> Tuple[Key, Optional[int]]:
+        """Return the state whose decision a JUMP carries out, and the number of that DECISION.
+
+        Where the oracle of the failed state would ask, one above may decide about its own state.
+        """
+        places = left_by(jump), key_of(jump)
+        decided = {key: self._decided.pop(key) for key in places if key in self._decided}
+        key = max(decided, key=decided.__getitem__, default=places[0])
+        return key, decided.get(key)
 
     def _go(
         self,
