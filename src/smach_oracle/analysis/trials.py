@@ -163,14 +163,14 @@ def events_of(trials: Iterable[TrialSummary]) -> Iterator[Tuple[TrialSummary, Li
 
 def load_replicates(
     places: Sequence[str], skipped: List[SkippedBag]
-) -> Dict[str, List[List[Event]]]:
+) -> Dict[str, List[TrialOfBags]]:
     """Return the trials with an oracle, by the folder they were recorded in, in order.
 
     Bags that cannot be used go to `skipped`, and so do trials that lack events.
 
     :raises BagError: where there are none, or no folder.
     """
-    found: Dict[str, List[List[Event]]] = {}
+    found: Dict[str, List[TrialOfBags]] = {}
     for trial in trials_of(dict(read_bags(places, skipped))):
         summary = trial.summary(None)
         lost = summary.lost_events
@@ -184,8 +184,8 @@ def load_replicates(
                 )
             )
         elif summary.recovers:
-            found.setdefault(summary.replicate, []).append(trial.events)
+            found.setdefault(summary.replicate, []).append(trial)
     return {
-        folder: sorted(trials, key=lambda events: events[0].wall_time)
+        folder: sorted(trials, key=lambda trial: trial.events[0].wall_time)
         for folder, trials in found.items()
     }

@@ -73,8 +73,8 @@ def _changed(recorded: Mapping[str, Any], settings: Mapping[str, Any]) -> Dict[s
 class Recorded:
     """One replicate, and what is needed to replay it."""
 
-    def __init__(self, trials: Sequence[Sequence[Event]]) -> None:
-        """`trials`: the events of each trial, in order.
+    def __init__(self, trials: Sequence[Sequence[Event]], nodes: Sequence[str] = ()) -> None:
+        """`trials`: the events of each trial, in order. `nodes`: whose they are.
 
         :raises BagError: where it cannot be replayed under its own settings.
         """
@@ -85,7 +85,10 @@ class Recorded:
         self._conditioned = conditioned(
             (event for trial in trials for event in trial), policy_of(self.settings)
         )
-        self.beginnings = beginnings(trials, lambda: self.replay({}))
+        try:
+            self.beginnings = beginnings(trials, lambda: self.replay({}))
+        except BagError as err:
+            raise BagError('{}. {}'.format(err, _why_not(trials, nodes))) from err
 
     def replay(self, settings: Mapping[str, Any]) -> Replay:
         """Return an oracle that has learned nothing, with these settings in place of its own."""
@@ -94,6 +97,24 @@ class Recorded:
     def settings_with(self, settings: Mapping[str, Any]) -> Dict[str, Any]:
         """Return the recorded settings, with others in their place."""
         return _changed(self.settings, settings)
+
+
+def _why_not(trials: Sequence[Sequence[Event]], nodes: Sequence[str]) -> str:
+    """Say why trials may not be those of one oracle."""
+    told = [dict(summarise(trial).settings) for trial in trials]
+    differing = []
+    for key in sorted({key for settings in told for key in settings}):
+        values = dict.fromkeys(str(settings.get(key, 'none')) for settings in told)
+        if len(values) > 1 and (key in NEEDED or '.' in key):  # no other one changes a decision
+            differing.append('{} {}'.format(key, ' and '.join(values)))
+    if differing:
+        return 'Its trials are under several settings: {}'.format(', '.join(differing))
+    several = sorted({*nodes} - {''})
+    of_nodes = 'Its trials are of several nodes: {}. '.format(', '.join(several))
+    return (of_nodes if len(several) > 1 else '') + (
+        'The state may have settings of its own, rates may be kept in a file, or trials may be '
+        'missing'
+    )
 
 
 def compare(recorded: Recorded, settings: Mapping[str, Any]) -> TriedSettings:
@@ -288,7 +309,9 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare what_if')
     replayed = []
     for folder, trials in sorted(replicates.items()):
         try:
-            recorded = Recorded(trials)
+            recorded = Recorded(
+                [trial.events for trial in trials], [trial.node for trial in trials]
+            )
             rows = [
                 compare(recorded, dict(zip(varied, values)))
                 for values in itertools.product(*varied.values())

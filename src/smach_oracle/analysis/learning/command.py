@@ -88,7 +88,7 @@ def _read(folders: Sequence[str], skipped: List[SkippedBag]) -> MachineRecord:
     :raises BagError: where there is nothing to learn from.
     """
     replicates = load_replicates(folders, skipped)
-    trials = [events for _, found in sorted(replicates.items()) for events in found]
+    trials = [trial.events for _, found in sorted(replicates.items()) for trial in found]
     where = ', '.join(folders)
     if not trials:
         raise BagError('{}: no trials with an oracle whose events are all there'.format(where))

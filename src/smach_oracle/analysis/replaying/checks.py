@@ -69,9 +69,9 @@ def _check_rate(own: Replay, event: Event) -> None:
         return
     if abs(own.rate(event) - event.rate) > _ROUNDING:
         raise BagError(
-            '{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}. The '
-            'state may have settings of its own, rates may be kept in a file, or trials may be '
-            'missing'.format(event.trial_id, event.state, event.rate, own.rate(event))
+            '{}: {} failed at a rate of {:.4f}, by the record of its results it is {:.4f}'.format(
+                event.trial_id, event.state, event.rate, own.rate(event)
+            )
         )
 
 
