@@ -28,6 +28,7 @@ from smach_oracle.oracle.decision.policy import Action
 from smach_oracle.oracle.errors import OracleError
 from smach_oracle.oracle.records.events import Event
 from smach_oracle.oracle.settings.paths import path_of
+from smach_oracle.oracle.settings.settings import Settings
 
 from .bag_events import BagError, SkippedBag
 from .compare_command.inputs import instead_of_bags
@@ -95,8 +96,13 @@ class Recorded:
         return Replay(self.settings_with(settings), self._conditioned)
 
     def settings_with(self, settings: Mapping[str, Any]) -> Dict[str, Any]:
-        """Return the recorded settings, with others in their place."""
-        return _changed(self.settings, settings)
+        """Return the recorded settings, with others in their place.
+
+        :raises SettingsError: where no oracle may have these.
+        """
+        found = _changed(self.settings, settings)
+        Settings.from_dict({name: found[name] for name in NEEDED if name != 'policy'})
+        return found
 
 
 def _why_not(trials: Sequence[Sequence[Event]], nodes: Sequence[str]) -> str:

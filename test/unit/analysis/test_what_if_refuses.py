@@ -1,5 +1,6 @@
 """What `compare what_if` does not replay, and the reasons that it gives."""
 
+import pytest
 import rosbag
 from failing_machines import KEPT, record, run
 
@@ -46,3 +47,19 @@ def test_trials_of_several_nodes_are_named(tmp_path, capsys):
                         both.write('/{}{}'.format(robot, topic), message, time)
     err = refused(capsys, tmp_path / 'both')
     assert 'Its trials are of several nodes: /left, /right. ' in err
+
+
+@pytest.mark.parametrize(
+    'options, told',
+    [
+        ('--moderate-from nan', 'moderate_from: nan is not allowed'),
+        ('--high-from -1', 'high_from: -1.0 is not allowed'),
+        ('--high-from 0.1', 'at most high_from, which is 0.1'),
+        ('--moderate-from 0.2 0.8 --high-from 0.3', 'at most high_from, which is 0.3'),
+        ('--prior 1.1', 'prior: 1.1 is not allowed'),
+        ('--memory 0', 'memory: 0 is not allowed'),
+    ],
+)
+def test_values_that_no_oracle_may_have_are_refused(tmp_path, capsys, options, told):
+    record(tmp_path, run(3))
+    assert told in refused(capsys, tmp_path, *options.split())
