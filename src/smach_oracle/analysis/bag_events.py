@@ -128,15 +128,17 @@ class BagContent(NamedTuple):
     stamps: List[float]  # of each of the events: ROS time, s. 0 where there was none
 
 
-def find_bags(places: Sequence[str]) -> List[str]:
+def find_bags(places: Sequence[str], skipped: Optional[List[SkippedBag]] = None) -> List[str]:
     """Return the paths of all bags, also `.bag.active`, in folders and below, sorted.
 
     Each is there once. A path of a file is taken as it is. Left out: the backups `X.orig.bag` that
     `rosbag reindex` makes of `X.bag`.
 
+    :param skipped: gets the folders that cannot be read.
     :raises BagError: where a place does not exist.
     """
     found: Dict[str, None] = {}
+    closed: List[SkippedBag] = []
     for place in places:
         if os.path.isfile(place):
             found[os.path.realpath(place)] = None
@@ -144,22 +146,31 @@ def find_bags(places: Sequence[str]) -> List[str]:
             raise BagError('{}: no such folder'.format(place))
         else:
             # below a real folder all folders are real: links to some are left out
-            for entry in _bags_below(os.path.realpath(place)):
+            for entry in _bags_below(os.path.realpath(place), closed):
                 found[os.path.realpath(entry.path) if entry.is_symlink() else entry.path] = None
+    if skipped is not None:
+        skipped.extend(sorted(set(closed)))
     return sorted(found)
 
 
 def walk_bags(folder: str) -> Iterator[str]:
     """Yield the paths of bags, by their names, in a folder and below. Not by links to folders."""
-    return (entry.path for entry in _bags_below(folder))
+    return (entry.path for entry in _bags_below(folder, []))
 
 
-def _bags_below(folder: str) -> Iterator['os.DirEntry[str]']:
+def _bags_below(folder: str, closed: List[SkippedBag]) -> Iterator['os.DirEntry[str]']:
+    """Yield the bags. `closed` gets the folders that cannot be read."""
     left = [folder]
     while left:
         entries: List['os.DirEntry[str]'] = []
-        with contextlib.suppress(OSError), os.scandir(left.pop()) as found:
-            entries.extend(found)  # a folder without rights, or that is gone, has none
+        place = left.pop()
+        try:
+            with os.scandir(place) as found:
+                entries.extend(found)
+        except FileNotFoundError:
+            pass  # it is gone by now
+        except OSError as err:
+            closed.append(SkippedBag(place, 'this folder cannot be read: ' + str(err.strerror)))
         names = {entry.name for entry in entries}
         for entry in entries:
             name = entry.name

@@ -14,23 +14,28 @@ from .bag_events import BagContent, BagError, EventReader, SkippedBag, find_bags
 ALL_READ, SOME_SKIPPED, NOTHING_COUNTED = 0, 1, 2  # exit codes
 
 
-def bags_in(places: Sequence[str]) -> List[str]:
-    """Return the paths of all bags in folders and below.
+def bags_in(places: Sequence[str], skipped: List[SkippedBag]) -> List[str]:
+    """Return the paths of all bags in folders and below. Adds unreadable folders to `skipped`.
 
     :raises BagError: where a place does not exist, or there are no bags.
     """
-    paths = find_bags(places)
+    paths = find_bags(places, skipped)
     if not paths:
-        raise BagError('{}: no bags'.format(', '.join(places)))
+        raise BagError('{}: no bags{}'.format(', '.join(places), reasons_of(skipped)))
     return paths
 
 
+def reasons_of(skipped: Sequence[SkippedBag]) -> str:
+    """Return lines that name what was skipped, with the reasons, to follow another line."""
+    return ''.join('\n  {}: {}'.format(item.path, item.reason) for item in skipped)
+
+
 def read_bags(places: Sequence[str], skipped: List[SkippedBag]) -> Iterator[Tuple[str, BagContent]]:
-    """Yield path and content of all bags in folders and below. Adds unusable ones to `skipped`.
+    """Yield path and content of all bags in folders and below. Adds what is unusable to `skipped`.
 
     :raises BagError: where a place does not exist, or there are no bags.
     """
-    paths = bags_in(places)
+    paths = bags_in(places, skipped)
     reader = EventReader()
     for path in paths:
         try:

@@ -24,7 +24,7 @@ from .counting.bag_counts import count_bags
 from .counting.counted_bag import Counting
 from .counting.trial_summary import TrialSummary
 from .counting.trials_of_bags import TrialOfBags, trials_of
-from .reading import bags_in, read_bags
+from .reading import bags_in, read_bags, reasons_of
 from .truth import TruthFiles
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _load(
     taken: Dict[str, Any] = {}
     bags = 0
     spread: Dict[str, Tuple[str, ...]] = {}  # trials that are in several bags, and these
-    for bag in count_bags(bags_in(places), counting, cluster):
+    for bag in count_bags(bags_in(places, skipped), counting, cluster):
         bags += 1
         if bag.reason:
             skipped.append(SkippedBag(bag.path, bag.reason))
@@ -107,9 +107,10 @@ def _load(
         summaries[trial.trial_id] = trial.summary(counting.rule)
         taken[trial.trial_id] = counting.take and counting.take(trial.events)
     if not summaries:
-        reasons = '\n'.join('  {}: {}'.format(item.path, item.reason) for item in skipped)
         raise BagError(
-            '{}: nothing was recorded in {} bag(s)\n{}'.format(', '.join(places), bags, reasons)
+            '{}: nothing was recorded in {} bag(s){}'.format(
+                ', '.join(places), bags, reasons_of(skipped)
+            )
         )
     found = sorted(
         _judged(summaries.values()), key=lambda trial: (trial.start_time, trial.trial_id)

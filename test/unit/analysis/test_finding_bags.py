@@ -1,25 +1,58 @@
 """Bags are found in folders and below, whatever else lies there."""
 
+import json
 import os
 
+import pytest
+
+from smach_oracle.analysis import bag_statistics
 from smach_oracle.analysis.bag_events import find_bags
 
 MANY = 20000
 
 
-def test_a_folder_that_may_not_be_read_has_none_and_the_others_are_searched(tmp_path, monkeypatch):
-    for name in ('closed', 'open'):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / 'a.bag').touch()
+@pytest.fixture
+def closed(monkeypatch):
+    """Folders called closed may not be read, and those called gone are removed meanwhile."""
     real = os.scandir
 
     def scandir(path):
         if os.path.basename(path) == 'closed':
             raise PermissionError(13, 'Permission denied', path)
+        if os.path.basename(path) == 'gone':
+            raise FileNotFoundError(2, 'No such file or directory', path)
         return real(path)
 
     monkeypatch.setattr(os, 'scandir', scandir)
-    assert find_bags([str(tmp_path)]) == [str(tmp_path / 'open' / 'a.bag')]
+
+
+def test_a_folder_that_may_not_be_read_is_named_and_the_others_are_searched(tmp_path, closed):
+    for name in ('closed', 'open', 'open/closed', 'gone'):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / 'a.bag').touch()
+    found = [str(tmp_path / 'open' / 'a.bag')]
+    assert find_bags([str(tmp_path)]) == found
+    skipped = []
+    assert find_bags([str(tmp_path), str(tmp_path / 'open')], skipped) == found
+    assert skipped == [
+        (str(tmp_path / name), 'this folder cannot be read: Permission denied')
+        for name in ('closed', 'open/closed')
+    ]
+
+
+def test_the_command_names_it_and_its_exit_code_tells(record, tmp_path, closed, capsys):
+    folder = record('bags', 3)
+    assert bag_statistics.main([folder]) == 0
+    whole = capsys.readouterr().out
+    (tmp_path / 'bags' / 'closed').mkdir()
+    assert bag_statistics.main([folder, '--json', str(tmp_path / 'all.json')]) == 1
+    out, err = capsys.readouterr()
+    reason = 'this folder cannot be read: Permission denied'
+    assert out == whole and err == 'Skipped {}/closed: {}\n'.format(folder, reason)
+    (skipped,) = json.loads((tmp_path / 'all.json').read_text())['skipped']
+    assert skipped == {'path': folder + '/closed', 'reason': reason}
+    assert bag_statistics.main([folder + '/closed']) == 2
+    assert reason in capsys.readouterr().err
 
 
 def test_one_that_is_half_written_is_found_and_no_other_file_is(tmp_path):
