@@ -5,7 +5,7 @@ import os
 import sys
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Iterator, List, NoReturn, Optional, TextIO
+from typing import Iterator, List, NoReturn, Optional, TextIO, Tuple
 
 from smach_oracle import __version__
 from smach_oracle.documentation import PAGES, page_of
@@ -16,6 +16,7 @@ without any other option:
   --version             print the version and exit
 """
 LACKING = 2  # exit code where a package is missing
+NOT_WRITTEN = 2  # exit code where the output cannot be written, such as to a full disk
 NO_READER = 141  # exit code where nobody reads the output any more, as a shell gives it for SIGPIPE
 # rooms whose commands print a result. The others have nodes, which go on without a reader of
 # their log
@@ -25,7 +26,8 @@ PRINTING = ('analysis.', 'experiment.', 'store.', 'ros.disk.', 'simulation.rehea
 class _Printed(io.TextIOWrapper):
     """Standard output or error of a command that prints.
 
-    Where it is a pipe whose reader has gone (`| head`), the process ends without a word.
+    Where it is a pipe whose reader has gone (`| head`), the process ends without a word. Where it
+    cannot be written for another reason, the process ends with one line.
     """
 
     def __init__(self, stream: TextIO) -> None:
@@ -39,31 +41,40 @@ class _Printed(io.TextIOWrapper):
     def write(self, text: str) -> int:
         """Write as usual.
 
-        :raises SystemExit: where nobody reads it any more.
+        :raises SystemExit: where it cannot be written.
         """
         try:
             return super().write(text)
-        except BrokenPipeError:
-            self._end()
+        except OSError as err:
+            self._end(err)
 
     def flush(self) -> None:
         """Flush as usual.
 
-        :raises SystemExit: where nobody reads it any more.
+        :raises SystemExit: where it cannot be written.
         """
         try:
             super().flush()
-        except BrokenPipeError:
-            self._end()
+        except OSError as err:
+            self._end(err)
 
-    def _end(self) -> NoReturn:
+    def _end(self, err: OSError) -> NoReturn:
         # what is left in the buffer is written at the end of the process
         os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
-        raise SystemExit(NO_READER)
+        if isinstance(err, BrokenPipeError):
+            raise SystemExit(NO_READER)
+        if self is not sys.stderr:
+            sys.stderr.write('{}: output: {}\n'.format(_named()[0], err.strerror))
+        raise SystemExit(NOT_WRITTEN)
 
 
-def _watched(stream: TextIO) -> TextIO:
-    """The stream in `_Printed`, unless a program has replaced it by one of its own."""
+def _watched(stream: Optional[TextIO]) -> TextIO:
+    """The stream in `_Printed`, unless a program has replaced it by one of its own.
+
+    Where it was closed (`>&-`), there is none, and nothing is printed.
+    """
+    if stream is None:
+        return open(os.devnull, 'w', encoding='utf-8')
     wrap = isinstance(stream, io.TextIOWrapper) and not isinstance(stream, _Printed)
     return _Printed(stream) if wrap else stream
 
@@ -128,12 +139,16 @@ def _asked(*options: List[str]) -> Optional[str]:
 
     None: it does not. Nothing else may follow `--version`.
     """
-    command, rest = os.path.basename(sys.argv[0]), sys.argv[1:]
-    subcommand = ' '.join([command, *rest[:1]])
-    if subcommand in PAGES:
-        command, rest = subcommand, rest[1:]
+    command, rest = _named()
     told = rest if VERSION in options else rest[:1]
     return command if told in options else None
+
+
+def _named() -> Tuple[str, List[str]]:
+    """Return the command, with its subcommand, and what stands behind it."""
+    command, rest = os.path.basename(sys.argv[0]), sys.argv[1:]
+    subcommand = ' '.join([command, *rest[:1]])
+    return (subcommand, rest[1:]) if subcommand in PAGES else (command, rest)
 
 
 @contextmanager

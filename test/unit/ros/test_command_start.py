@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from catkin_pkg.changelog import get_changelog_from_path
+from resumed_trial import record_resumed_trial
 
 from smach_oracle import __version__, commands
 from smach_oracle.analysis.compare_command.dispatch import SUBCOMMANDS
@@ -98,6 +99,39 @@ def test_a_command_whose_reader_has_gone_ends_without_a_word(line, what_of_it):
     )
     assert told.stderr == ''
     assert told.stdout == '{}\n'.format(commands.NO_READER)
+
+
+PRINTS = [
+    'bag_statistics ' + BAGS,
+    'compare what_if ' + BAGS,
+    'compare variants ' + ROWS,
+    'learn {bags}',
+    'learn --help',
+]
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    """Bags with ways to learn from."""
+    return record_resumed_trial(tmp_path_factory.mktemp('ways'))
+
+
+@pytest.mark.parametrize('line', PRINTS)
+def test_a_command_whose_output_cannot_be_written_says_so_in_one_line(line, bags):
+    told = run('{} scripts/{} > /dev/full'.format(sys.executable, line.format(bags=bags)))
+    name = re.match(r'compare \w+|\w+', line).group()
+    assert told.stderr == '{}: output: No space left on device\n'.format(name)
+    assert told.returncode == commands.NOT_WRITTEN
+
+
+@pytest.mark.parametrize('line', PRINTS)
+@pytest.mark.parametrize('closed', ['>&-', '2>&-', '>&- 2>&-'])
+def test_a_command_without_an_output_does_its_work(line, bags, closed):
+    whole = '{} scripts/{}'.format(sys.executable, line.format(bags=bags))
+    there, told = run(whole), run('{} {}'.format(whole, closed))
+    assert told.stdout == ('' if closed.startswith('>') else there.stdout)
+    assert told.stderr == ('' if '2>' in closed else there.stderr)
+    assert told.returncode == there.returncode
 
 
 @pytest.mark.parametrize('line', ['compare variants none.csv', 'compare figures none --output out'])
