@@ -105,7 +105,7 @@ def _wrap_again(
             remove_oracle(node)
         top.tree.recover = tree.recover
         top.take_name(arguments.name)
-        tree.take_over(top.tree)  # what is not given anew stays
+        tree.take_over(top.tree)  # what is not given again stays
         top.tree.expert, top.tree.health.given = tree.expert, tree.health.given
         _configure(machine, arguments.settings)
         _put_in_order(machine, arguments)
