@@ -27,14 +27,15 @@ class _Printed(io.TextIOWrapper):
     """Standard output or error of a command that prints.
 
     Where it is a pipe whose reader has gone (`| head`), the process ends without a word. Where it
-    cannot be written for another reason, the process ends with one line.
+    cannot be written for another reason, the process ends with one line. A letter that the encoding
+    lacks is written as `\\xfc`.
     """
 
     def __init__(self, stream: TextIO) -> None:
         super().__init__(
             stream.buffer,
             stream.encoding,
-            stream.errors,
+            'backslashreplace' if stream.errors == 'strict' else stream.errors,
             line_buffering=stream.isatty() or stream is sys.stderr,
         )
 

@@ -12,6 +12,7 @@ import sys
 from typing import TYPE_CHECKING, Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 from smach_oracle.cluster import ClusterError, WorkerCluster, add_options
+from smach_oracle.oracle.records.short_text import seen
 from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -49,7 +50,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
             for text in cluster.messages if cluster else ():
                 sys.stderr.write('bag_statistics: {}\n'.format(text))
         variants = count_variants(found.trials)
-        sys.stdout.write(table.format_text(variants, found.trials))
+        sys.stdout.write(seen(table.format_text(variants, found.trials)))
         states = None if by_trial is None else _print_states(found, by_trial)
         groups = _print_groups(args, found) if args.by else None
         code = report_skipped(found.skipped)
@@ -70,7 +71,7 @@ def _print_states(found: Trials, by_trial: Mapping[str, 'StatesOfTrials']) -> Li
     from .by_state.text import format_states
 
     states = by_variant(found.trials, by_trial)
-    sys.stdout.write(format_states(states))
+    sys.stdout.write(seen(format_states(states)))
     return states
 
 
@@ -78,7 +79,7 @@ def _print_groups(args: argparse.Namespace, found: Trials) -> List[TrialGroup]:
     from .comparing.report import format_groups
 
     groups = groups_by(args.by, found.trials, args.folders)
-    sys.stdout.write(format_groups(args.by, groups))
+    sys.stdout.write(seen(format_groups(args.by, groups)))
     return groups
 
 

@@ -8,7 +8,10 @@ import time
 from pathlib import Path
 
 import pytest
+from test_way_reader import ALL, Scripted
+from test_ways_and_decisions import recorded
 
+import smach
 from smach_oracle.analysis import bag_statistics, sweep, trial_steps, what_if
 
 ROOT = Path(__file__).parents[3]
@@ -80,6 +83,24 @@ def test_two_experiments_have_a_figure_each(record, tmp_path, capsys):
         'f_PICK_AND_PLACE.png',
         'f_PICK_AND_PLACE.svg',
     ]
+
+
+def test_names_of_states_neither_steer_the_terminal_nor_end_a_line(tmp_path, capsys):
+    names = ['\x1b[31mred', 'a\nb', '\u202eleft']
+    machine = smach.StateMachine(ALL)
+    with machine:
+        for name, following in zip(names, [*names[1:], 'succeeded']):
+            smach.StateMachine.add(name, Scripted('aborted'), {'succeeded': following})
+    _, counts = recorded(tmp_path, machine, settings={'policy': {'name': 'restart', 'times': 5}})
+    assert set(counts.states) == {'TOP/' + name for name in names}
+    capsys.readouterr()  # what the machine has logged
+    assert bag_statistics.main([str(tmp_path), '--by-state', '--by', 'settings']) == 0
+    out = capsys.readouterr().out
+    assert not set(out) & set('\x1b\u202e')
+    for name in ('\ufffd[31mred', 'a b', '\ufffdleft'):
+        assert '\n  {} failed once:\n'.format(name) in out
+        assert '\n  {:<38}'.format(name) in out
+    assert '    going back to \ufffd[31mred ' in out
 
 
 def test_skipped_bags_are_named_and_the_exit_code_tells(record, capsys):

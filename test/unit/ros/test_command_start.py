@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -132,6 +133,21 @@ def test_a_command_without_an_output_does_its_work(line, bags, closed):
     assert told.stdout == ('' if closed.startswith('>') else there.stdout)
     assert told.stderr == ('' if '2>' in closed else there.stderr)
     assert told.returncode == there.returncode
+
+
+@pytest.mark.parametrize(
+    'line', ['bag_statistics {0} --html {0}/a.html', 'oracle_disk --keep-gb 1 {0}']
+)
+def test_a_letter_that_the_encoding_lacks_ends_no_command(line, tmp_path):
+    folder = tmp_path / 'K\xfcche'
+    shutil.copytree(str(ROOT / BAGS), str(folder))
+    (folder / 'broken.bag').write_text('?')
+    told = run(
+        '{} scripts/{} 2>&1'.format(sys.executable, line.format(folder)),
+        env=dict(os.environ, PYTHONIOENCODING='ascii'),
+    )
+    assert 'K\\xfcche' in told.stdout and 'Traceback' not in told.stdout
+    assert told.returncode == ('disk' not in line)
 
 
 @pytest.mark.parametrize('line', ['compare variants none.csv', 'compare figures none --output out'])

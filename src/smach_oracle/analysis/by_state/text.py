@@ -44,7 +44,11 @@ def _in_order(found: StatesOfTrials) -> List[str]:
 
 def _short(name: str, experiment: str) -> str:
     begin = experiment + '/'
-    return name[len(begin) :] if name.startswith(begin) else name
+    return _in_one_line(name[len(begin) :] if name.startswith(begin) else name)
+
+
+def _in_one_line(text: str) -> str:
+    return ' '.join(text.splitlines())
 
 
 def _overview(experiment: str, found: StatesOfTrials) -> List[str]:
@@ -107,7 +111,7 @@ def answers_of(counts: StateCounts) -> List[str]:
 
 def _way(words: str, count: WayCount) -> str:
     return '    {:<{}}{:>6}{:>9}{:>9}{:>11}{:>13.1f}'.format(
-        shortened(words, _NAME + 5),
+        shortened(_in_one_line(words), _NAME + 5),
         _NAME + 6,
         count.gone,
         count.helped,

@@ -5,13 +5,12 @@ have: control characters, marks that turn the direction of what follows, and end
 """
 
 import datetime
-import re
 from pathlib import Path
 from typing import Any, Optional, Sequence
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from smach_oracle.oracle.records.short_text import shortened
+from smach_oracle.oracle.records.short_text import seen, shortened
 
 from ..by_state.rows import costs_of
 from ..by_state.text import ANSWER_WORDS, answers_of
@@ -25,10 +24,6 @@ from .machine_graphs import colour_of
 
 TEMPLATES = Path(__file__).parent / 'templates'
 LONGEST = 400  # letters of a text that are shown
-_UNSEEN = re.compile(
-    '[\x00-\x08\x0b-\x1f\x7f-\x9f\u061c\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ufff9-\ufffb'
-    '\ufffe\uffff\ud800-\udfff]'
-)
 
 
 def write_report(
@@ -87,7 +82,7 @@ def shown(value: Any) -> Any:
     if value is None:
         return '–'
     if isinstance(value, str) and not hasattr(value, '__html__'):
-        return shortened(_UNSEEN.sub('\ufffd', value), LONGEST)
+        return shortened(seen(value), LONGEST)
     return value
 
 
