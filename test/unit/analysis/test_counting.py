@@ -136,14 +136,21 @@ def test_another_version_of_the_package_counts_anew(cache, folder, read, monkeyp
 
 
 def test_the_version_is_that_of_the_files_that_count(tmp_path, monkeypatch):
-    for name in ('analysis/counting/a.py', 'oracle/records/b.py', 'bag_format.py', 'ros/c.py'):
+    counting = (
+        'analysis/counting/a.py',
+        'oracle/records/b.py',
+        'bag_format.py',
+        'trial_counter.py',
+    )
+    for name in (*counting, 'ros/c.py'):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text('')
+    assert all((kept_counts._PACKAGE / part).exists() for part in kept_counts._COUNTS)
     monkeypatch.setattr(kept_counts, '_PACKAGE', tmp_path)
     before = kept_counts._version()
     (tmp_path / 'ros/c.py').write_text('import os')
     assert kept_counts._version() == before
-    for name in ('analysis/counting/a.py', 'oracle/records/b.py', 'bag_format.py'):
+    for name in counting:
         (tmp_path / name).write_text('import os')
         assert kept_counts._version() != before
         before = kept_counts._version()

@@ -26,7 +26,8 @@ _TABLES = ('counts', 'shared')  # of bags by key, and what these share by name
 _BUSY_S = 0.5  # another count may be writing
 _DAY_S = 86400
 _PACKAGE = Path(__file__).resolve().parents[2]
-_COUNTS = ('analysis', 'oracle', 'bag_format.py')  # the part of the package that counts
+# the part of the package that counts
+_COUNTS = ('analysis', 'oracle', 'bag_format.py', 'trial_counter.py')
 
 
 class KeptCounts:
