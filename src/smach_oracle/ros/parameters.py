@@ -1,13 +1,16 @@
 """A node's private parameters, checked: an error names the parameter and what is allowed."""
 
 import math
-from typing import Any, List, Mapping
+from typing import Any, Dict, List, Mapping
 
 import rospy
 
 from smach_oracle.oracle.settings import checks
 
 from .log.said_once import warn_once
+
+_NOT_SET = object()
+_read: Dict[str, object] = {}  # by name, what was read last by `read_or_default`
 
 
 def number_of(key: str, default: float, low: float, high: float) -> float:
@@ -70,14 +73,24 @@ def checked_mapping(key: str, value: object) -> Mapping[str, Any]:
 def read_or_default(param: str, default: object) -> object:
     """Return a parameter, unchecked. The default where it is not set or the master does not answer.
 
-    A master that does not answer is logged: a robot starts without it.
+    A master that does not answer is logged: a robot starts without it. What was read before stays
+    then, and where the master was started again and does not know the parameter any more.
     """
+    name = rospy.resolve_name(param)
     try:
-        value: object = rospy.get_param(param, default)
+        value: object = rospy.get_param(param, _NOT_SET)
     except (OSError, rospy.ROSException) as err:
-        warn_once('Parameter {} could not be read: {}'.format(rospy.resolve_name(param), err))
-        return default
-    return value
+        why = 'could not be read: {}'.format(err)
+    else:
+        if value is not _NOT_SET:
+            _read[name] = value
+            return value
+        why = 'is not set any more'
+        if name not in _read:
+            return default
+    stays = '; it stays as it was' if name in _read else ''
+    warn_once('Parameter {} {}{}'.format(name, why, stays))
+    return _read.get(name, default)
 
 
 def private_flag(name: str, default: bool) -> bool:

@@ -189,14 +189,27 @@ def test_a_state_of_a_nested_machine_can_be_set_by_parameter(node):
     }
 
 
+def refuse(name, default):
+    raise ConnectionRefusedError('nobody there')
+
+
 def test_an_unreachable_master_does_not_keep_the_robot_from_starting(node, monkeypatch):
     node()
-
-    def refuse(name, default):
-        raise ConnectionRefusedError('nobody there')
-
     monkeypatch.setattr(settings_module.rospy, 'get_param', refuse)
     assert read_param('~oracle').values == {}
+
+
+@pytest.mark.parametrize('is_there', [False, True])
+def test_what_was_read_stays_where_the_master_forgets_it(node, monkeypatch, is_there):
+    node(oracle={'memory': 3})
+    assert read_param('~oracle').values == {'memory': 3}
+    if is_there:  # it was started again
+        node()
+    else:
+        monkeypatch.setattr(settings_module.rospy, 'get_param', refuse)
+    assert read_param('~oracle').values == {'memory': 3}
+    node(oracle={'memory': 4})
+    assert read_param('~oracle').values == {'memory': 4}
 
 
 def test_without_a_node_no_parameter_is_asked_for(write):

@@ -130,7 +130,7 @@ def parameters_are(given: Dict[str, Any]) -> Any:
 
     with mock.patch.multiple('rospy', get_param=get, resolve_name=lambda name: name), mock.patch(
         'rospy.core.is_initialized', lambda: True
-    ):
+    ), mock.patch.object(parameters, '_read', {}):
         yield
 
 
