@@ -42,6 +42,20 @@ with sm:
 EXECUTE = """
 print('OUTCOME {}'.format(sm.execute()), flush=True)
 """
+NESTED_BY_ITSELF = """
+import time
+sm.execute()
+x = inner.get_children()['X']
+def until_preempted(ud):
+    print('ALONE', flush=True)
+    while not x.preempt_requested():
+        time.sleep(0.01)
+    print('OBEYS', flush=True)
+    x.service_preempt()
+    return 'succeeded'
+x.execute = until_preempted
+inner.execute()
+"""
 OWN_SERVER = """
 sis = smach_ros.IntrospectionServer('viewed', sm, '/SHOWN')
 sis.start()
@@ -102,6 +116,32 @@ class OracleControlTest(unittest.TestCase):
         (events,) = recorded_events(self.folder)
         self.assertEqual([event.seq for event in events], list(range(len(events))))
         return events
+
+    def test_a_nested_machine_that_is_executed_by_itself_obeys(self) -> None:
+        def preempt(task: Process) -> None:
+            self.assertEqual(self.call('preempt'), 'task/INNER is asked to stop')
+
+        for stop in (preempt, lambda task: task.signal(signal.SIGINT)):
+            task = self.run_task(SCRIPT + NESTED_BY_ITSELF)
+            task.go_on()
+            self.assertTrue(task.says('ALONE'), task.output())
+            self.assertTrue(wait_for(lambda: self.status.running), 'its trial is shown')
+            stop(task)
+            self.assertEqual(task.wait(), 0, task.output())
+            self.assertIn('OBEYS', task.output())
+
+    def test_a_machine_that_is_built_anew_is_held_as_the_one_before(self) -> None:
+        built = SCRIPT[SCRIPT.index('inner =') :]
+        task = self.run_task(SCRIPT + EXECUTE + built + EXECUTE)
+        self.call('breakpoint', SetBreakpoint, pattern='FIRST')
+        task.go_on()
+        self.assertTrue(task.says('OUTCOME succeeded'), task.output())
+        self.assert_waits_before('task/FIRST')
+        self.assertEqual(task.output().count('RUNS FIRST'), 1, task.output())
+        self.call('resume')
+        task.go_on()
+        self.assertEqual(task.wait(), 0, task.output())
+        self.assertEqual(task.output().count('RUNS FIRST'), 2, task.output())
 
     def test_pause_step_and_resume(self) -> None:
         task = self.run_task()

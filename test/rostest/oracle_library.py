@@ -51,6 +51,19 @@ rospy.init_node('task')
 run(sm)
 """
 )
+WRAPPED_AGAIN = (
+    PRELUDE
+    + """
+rospy.init_node('task')
+sm = smach.StateMachine(outcomes=OUTCOMES)
+with sm:
+    smach.StateMachine.add('PICK', Turn())
+for memory in 7, 5:
+    OracleContainer.wrap(sm, settings={'memory': memory, 'max_recoveries': 3}).execute()
+    told = sm.settings.defaults
+    print('SET {} {}'.format(told.memory, told.max_recoveries), flush=True)
+"""
+)
 BUILT_BY_HAND = (
     PRELUDE
     + """
@@ -266,6 +279,13 @@ class LibraryTest(unittest.TestCase):
             ),
             1,
         )
+
+    def test_the_parameter_goes_over_the_settings_of_a_machine_that_is_wrapped_again(self) -> None:
+        self.set_param('oracle', {'max_recoveries': 0})
+        program = self.start(WRAPPED_AGAIN)
+        self.assertEqual(program.wait(), 0, program.output())
+        self.assertIn('SET 7 0', program.output())
+        self.assertIn('SET 5 0', program.output())
 
     def test_a_settings_object_is_taken_as_it_is(self) -> None:
         self.set_param('oracle', {'max_recoveries': 0})

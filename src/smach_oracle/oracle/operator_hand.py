@@ -9,7 +9,7 @@ from typing import List, Mapping, NamedTuple, Sequence, Tuple
 import smach
 from smach_common.foreign import repr_of
 
-from .control.control import HeldPlace, Hold, Jump
+from .control.control import Control, HeldPlace, Hold, Jump
 from .errors import OperatorError, SettingsError, TrialError
 from .execution.jump_entry import Prospect, jump_path_for, prospect_of
 from .machine.nesting import nodes_of
@@ -96,32 +96,38 @@ class OperatorHand:
     def _top(self) -> TreeNode:
         return self._node.top()
 
+    @property
+    def control(self) -> Control:
+        """Return what is asked of the tree."""
+        return self._top.tree.control
+
     # -- what is never refused
 
     def pause(self, by: str = '') -> str:
         """Hold every container at its next state boundary. What runs now runs to its end."""
-        self._top.tree.control.pause(by)
+        self.control.pause(by)
         return self._told('pause', self._how_it_pauses(), by)
 
     def resume(self, by: str = '') -> str:
         """Lift the pause."""
-        held = self._top.tree.control.resume()
+        held = self.control.resume()
         return self._told('resume', self._what_goes_on(held), by)
 
     def preempt(self, by: str = '') -> str:
         """Ask the machine to stop, and lift the pause: what waits ends at once, preempted."""
         top = self._top
-        text = '{} is asked to stop'.format(top.path)
+        running = self._running()
+        text = '{} is asked to stop'.format(', '.join(each.path for each in running))
         with top.tree.control.stop():
-            try:
-                if top.machine.is_running():
-                    top.machine.request_preempt()
-                else:
-                    text = '{} does not run'.format(top.path)
-                    if top.tree.control.paused:
-                        text += '; its pause is lifted'
-            except Exception as err:  # it is the user's
-                text += ', and its request_preempt failed: {}'.format(repr_of(err))
+            if not running:
+                text = '{} does not run'.format(top.path)
+                if top.tree.control.paused:
+                    text += '; its pause is lifted'
+            for each in running:
+                try:
+                    each.machine.request_preempt()
+                except Exception as err:  # it is the user's
+                    text += ', and its request_preempt failed: {}'.format(repr_of(err))
         return self._told('preempt', text, by)
 
     # -- one state at a time
@@ -136,7 +142,7 @@ class OperatorHand:
             not where there is no such container.
         """
         self._nodes_at(path)
-        control = self._top.tree.control
+        control = self.control
         was_paused = control.paused
         control.pause(by)
         held = control.step(path)
@@ -152,13 +158,13 @@ class OperatorHand:
         :param path: of the container, as in events. '' means every one.
         :raises OperatorError: where none waits for it.
         """
-        held = self._top.tree.control.confirm(path)
+        held = self.control.confirm(path)
         if not held:
             raise OperatorError(
                 '{} waits for a confirmation'.format('nothing in ' + path if path else 'nothing')
             )
         text = _runs(held)
-        if self._top.tree.control.paused:
+        if self.control.paused:
             text += ' once it is resumed'
         return self._told('confirm', text, by, path)
 
@@ -242,7 +248,7 @@ class OperatorHand:
         note_initial(self._node, state)
 
     def _ask_jump(self, node: TreeNode, jump: Jump) -> str:
-        control = self._top.tree.control
+        control = self.control
         label = current_label_of(node.machine)
         is_held = any(hold.may_be_sent and hold.key == node.key for hold in control.holds())
         control.ask_jump(node.key, jump)
@@ -261,7 +267,7 @@ class OperatorHand:
         :raises OperatorError: where it cannot be read.
         """
         meant = _pattern(pattern)
-        self._top.tree.control.set_breakpoint(meant)
+        self.control.set_breakpoint(meant)
         return self._told(
             'set_breakpoint',
             '{} pauses before {}'.format(self._top.path, self._states_meant(meant)),
@@ -274,7 +280,7 @@ class OperatorHand:
 
         :raises OperatorError: where there is none of this pattern.
         """
-        meant, control = _pattern(pattern), self._top.tree.control
+        meant, control = _pattern(pattern), self.control
         if not control.remove_breakpoint(meant):
             raise OperatorError(
                 'there is no breakpoint {}; there are: {}'.format(
@@ -297,7 +303,7 @@ class OperatorHand:
             raise OperatorError(
                 'there is no autonomy {!r}; allowed: {}'.format(level, ', '.join(AUTONOMY_LEVELS))
             )
-        self._top.tree.control.set_level(meant, level)
+        self.control.set_level(meant, level)
         return self._told(
             'set_autonomy',
             'autonomy {} for {}'.format(level or 'as the settings say', self._states_meant(meant)),
@@ -323,11 +329,11 @@ class OperatorHand:
 
     def status(self) -> HandStatus:
         """Return how the machine stands, and what is set."""
-        top, control = self._top, self._top.tree.control
+        top, control = self._top, self.control
         jumps = {path: jump.named() for path, jump in control.jumps().items()}
         return HandStatus(
             top.path,
-            top.machine.is_running(),
+            bool(self._running()),
             control.paused,
             control.paused_by,
             tuple(self._active()),
@@ -336,8 +342,16 @@ class OperatorHand:
             jumps,
         )
 
+    def _running(self) -> List[TreeNode]:
+        """Return the containers whose trials run: the top machine, or nested ones by themselves."""
+        return [
+            node
+            for node in nodes_of(self._top.machine)
+            if node.machine.is_running() and not node.has_running_ancestor()
+        ]
+
     def _active(self) -> List[ActiveState]:
-        held = self._top.tree.control.holds()
+        held = self.control.holds()
         at_boundary = {hold.key for hold in held if hold.may_be_sent}
         found = []
         for node in nodes_of(self._top.machine):
@@ -362,7 +376,7 @@ class OperatorHand:
 
     def _how_it_pauses(self) -> str:
         top = self._top
-        if not top.machine.is_running():
+        if not self._running():
             return '{} does not run; it will wait before its first state'.format(top.path)
         waits = [_in_words(each) for each in self._active() if each.held_by]
         runs = self._what_runs()
@@ -401,7 +415,7 @@ class OperatorHand:
         asks = [hold.place.in_words() for hold in held if hold.waits_for_confirmation]
         if free:
             text = _runs(free)
-        elif not top.machine.is_running():
+        elif not self._running():
             text = '{} does not run; it will not wait'.format(top.path)
         else:
             text = '{} goes on; nothing has waited for that'.format(top.path)

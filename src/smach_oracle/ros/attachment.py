@@ -86,7 +86,7 @@ class _RecordingPlan(NamedTuple):
 
 
 class _BegunTrial(NamedTuple):
-    machine: OracleContainer
+    machine: smach.StateMachine  # a top-level one, or one nested in it, by itself
     thread: int
 
 
@@ -99,8 +99,8 @@ class Attachments:
         self.refusing: Callable[[], ContextManager[object]] = nullcontext
         self._lock = threading.RLock()
         self._trials: List[_BegunTrial] = []  # from before they begin to after their last events
-        # the machines that are attached to the node
-        self._on_ros: WeakIdentityMap[OracleContainer, bool] = WeakIdentityMap()
+        # the machines that are attached to the node, with the paths by which they are shown
+        self._on_ros: WeakIdentityMap[OracleContainer, str] = WeakIdentityMap()
         # our servers, by path. Each holds its machine
         self._introspection: Dict[str, IntrospectionServer] = {}
         self._shown: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by the same paths
@@ -114,6 +114,7 @@ class Attachments:
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
         self._recorder_wanted = True
+        self._wants_introspection = True
         self._replays: Optional[FailureReplays] = None
         self._node_started = False
         # of the work of all trials, under simulated time
@@ -143,7 +144,7 @@ class Attachments:
         return machine in self._on_ros
 
     @contextmanager
-    def trial(self, machine: OracleContainer) -> Iterator[None]:
+    def trial(self, machine: smach.StateMachine) -> Iterator[None]:
         """Keep the bags open until the trial has told its end.
 
         While the handler of a signal waits, none begins, except within a state of one that runs.
@@ -197,11 +198,27 @@ class Attachments:
             if node:
                 self._start_node()
                 self._attach_to_node(machine)
-                self._on_ros[machine] = True
             # last: topics that are there already are recorded from the first trial on
             self._record(machine, plan)
             if self._replays is not None:
                 self._replays.watch(oracle_of(machine).events)  # behind the recorder
+
+    def begins(self, machine: OracleContainer) -> None:
+        """Have what goes by the path of an attached machine mean this one, for its next trial.
+
+        Another machine of the path may have run since. The machine may have another name now.
+        """
+        if not self.has(machine) or rospy.core.is_shutdown_requested():
+            return
+        path = oracle_of(machine).path
+        with self._lock:
+            if self._on_ros.get(machine) != path:
+                self._show(machine)
+            shown = self._shown.get(path)
+            if shown is not None and shown() is not machine:
+                self._introspect(machine)
+            if self._hand is not None:
+                self._hand.begins(machine)
 
     def detach(self, machine: OracleContainer) -> None:
         """Let go of a top-level machine that has ended and is about to come out of its oracle.
@@ -209,6 +226,7 @@ class Attachments:
         Where it is wrapped again, its first execute attaches it again.
         """
         with self._lock:
+            self._hide(machine, self._on_ros.get(machine) or '')
             self._on_ros.forget(machine)
             if self._rates is not None:
                 self._rates.forget(machine)
@@ -216,11 +234,6 @@ class Attachments:
                 self._hand.forget(machine)
             if self._diagnostics is not None:
                 self._diagnostics.forget(machine)
-            path = oracle_of(machine).path
-            shown = self._shown.get(path)
-            if shown is not None and shown() is machine:
-                del self._shown[path]
-                self._introspection.pop(path).stop()
 
     def preempt(self) -> None:
         """Ask every machine that runs, or is about to, to stop, as the process goes down.
@@ -260,7 +273,7 @@ class Attachments:
             )
 
     def _attach_to_node(self, machine: OracleContainer) -> None:
-        introspect = private_flag('introspection', True)  # first, since it may raise
+        self._wants_introspection = private_flag('introspection', True)  # first, as it may raise
         oracle = oracle_of(machine)
         if oracle.recovers and oracle.expert is None:
             oracle.expert = self._shared_expert()
@@ -270,14 +283,29 @@ class Attachments:
             oracle.events.observers.append(self._events)
         if self._rates is not None:
             self._rates.watch(machine)
-        if self._told_trials is not None:
-            self._told_trials.watch(oracle.path, oracle.events)
-        if introspect and not has_introspection(machine):
-            self._introspect(machine)
+        self._show(machine)
         if self._hand is not None:
             self._hand.watch(machine)
         if self._diagnostics is not None:
             self._diagnostics.watch(machine)
+
+    def _show(self, machine: OracleContainer) -> None:
+        """Show a machine by its path, and not by an earlier one."""
+        oracle, before = oracle_of(machine), self._on_ros.get(machine)
+        self._on_ros[machine] = oracle.path
+        if self._told_trials is not None:
+            self._told_trials.watch(oracle.path, oracle.events)
+        if before is not None:
+            self._hide(machine, before)
+        if self._wants_introspection and not has_introspection(machine):
+            self._introspect(machine)
+
+    def _hide(self, machine: OracleContainer, path: str) -> None:
+        """Stop the introspection of a machine by this path."""
+        shown = self._shown.get(path)
+        if shown is not None and shown() is machine:
+            del self._shown[path]
+            self._introspection.pop(path).stop()
 
     def _let_time_pass(self, machine: OracleContainer) -> None:
         """Have waits and work take the time of the world, where there is a simulated one."""

@@ -8,7 +8,8 @@ recorder (`~record`: folder, `~record_topics`: list). Without a node it behaves 
 """
 
 import functools
-from typing import TYPE_CHECKING, Any, Mapping, NamedTuple, Optional, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, Iterator, Mapping, NamedTuple, Optional, Sequence
 
 import rospy
 
@@ -90,6 +91,7 @@ class OracleContainer(BareContainer):
             health=health,
         )
         _remember(self, settings, preconditions, None)
+        _tell_of_ros(self)
 
     @classmethod
     def wrap(
@@ -121,6 +123,7 @@ class OracleContainer(BareContainer):
             health=health,
         )
         _remember(wrapped, settings, preconditions, nested)
+        _tell_of_ros(wrapped)
         return wrapped
 
     def execute(self, *args: object, **kwargs: object) -> Optional[str]:
@@ -133,21 +136,39 @@ class OracleContainer(BareContainer):
         oracle = oracle_of(self)
         if not oracle.is_top or self.is_running() or oracle.is_parents:
             return super().execute(*args, **kwargs)
-        oracle.describe_failure = describe_failure
-        attachments = _attachments()
-        with attachments.refusing(), machine_names().running(self):
-            if not (attachments.has(self) or attachments.has_parents_node):
-                self._attach()
-            with attachments.trial(self):
-                return super().execute(*args, **kwargs)
+        _tell_of_ros(self)
+        with _attached(self, self):
+            return super().execute(*args, **kwargs)
 
-    def _attach(self) -> None:
-        try:
-            take_parameters(self)
-            outside_main_thread(functools.partial(_attachments().attach, self))
-        except rospy.ROSInterruptException as err:
-            # as a bare machine, it runs and finds the shutdown itself
-            rospy.logwarn('%s is not attached to its node: %s', oracle_of(self).path, err)
+
+def _tell_of_ros(machine: OracleContainer) -> None:
+    """Have a machine describe failures of actions, and attach it where one in it begins a trial."""
+    oracle = oracle_of(machine)
+    if oracle.is_top:
+        oracle.describe_failure = describe_failure
+        oracle.around_nested_trial = functools.partial(_attached, machine)
+
+
+@contextmanager
+def _attached(top: OracleContainer, machine: smach.StateMachine) -> Iterator[None]:
+    """Attach the top machine of a trial to its node, for a trial of `machine` in the body."""
+    attachments = _attachments()
+    with attachments.refusing(), machine_names().running(top):
+        if not attachments.has_parents_node:
+            _attach(top)
+        attachments.begins(top)
+        with attachments.trial(machine):
+            yield
+
+
+def _attach(machine: OracleContainer) -> None:
+    try:
+        take_parameters(machine)
+        if not _attachments().has(machine):
+            outside_main_thread(functools.partial(_attachments().attach, machine))
+    except rospy.ROSInterruptException as err:
+        # as a bare machine, it runs and finds the shutdown itself
+        rospy.logwarn('%s is not attached to its node: %s', oracle_of(machine).path, err)
 
 
 def _attachments() -> 'Attachments':

@@ -15,7 +15,7 @@ import rospy
 import smach
 from smach_oracle.forking import in_child
 from smach_oracle.oracle import OracleContainer, oracle_of
-from smach_oracle.oracle.identity import remove_identical
+from smach_oracle.oracle.identity import WeakIdentityMap, remove_identical
 
 # what every script is called that oracle_run.launch runs and nobody has named
 LAUNCHED_NAME = 'oracle_run'
@@ -47,6 +47,7 @@ class MachineNames:
         self.script = ''
         self._named: List[_Named] = []
         self._promised: Set[str] = set()
+        self._given_to: WeakIdentityMap[smach.StateMachine, bool] = WeakIdentityMap()
         self._running: List[OracleContainer] = []
         self._lock = threading.Lock()
         in_child(self._let_go)
@@ -62,6 +63,7 @@ class MachineNames:
         with self._lock:
             name = self._find(tuple(machine.get_children()), machine)
             self._promised.add(name)
+            self._given_to[machine] = True
             return name
 
     @contextmanager
@@ -69,10 +71,12 @@ class MachineNames:
         """Give the machine a name for the body, which no other machine takes."""
         with self._lock:
             oracle = oracle_of(machine)
-            if not oracle.is_named:
+            is_given = machine in self._given_to
+            if not oracle.is_named or (is_given and oracle.name in self._running_beside(machine)):
                 meta = oracle.settings.oracle_label
                 labels = tuple(label for label in machine.get_children() if label != meta)
                 oracle.take_name(self._find(labels, machine))
+                self._given_to[machine] = True
             self._promised.discard(oracle.name)
             self._running.append(machine)
         try:
@@ -86,13 +90,16 @@ class MachineNames:
         if not stem:
             return ''  # it stays as it is, and may yet be named
         structure = labels, tuple(sorted(machine.get_registered_outcomes(), key=str))
-        taken = self._promised.union(oracle_of(machine).name for machine in self._running)
+        taken = self._promised.union(self._running_beside(machine))
         for named in self._named:
             if named.structure == structure and named.name not in taken:
                 return named.name
         name = self._next(stem, taken.union(named.name for named in self._named))
         self._named.append(_Named(structure, name))
         return name
+
+    def _running_beside(self, machine: smach.StateMachine) -> List[str]:
+        return [oracle_of(each).name for each in self._running if each is not machine]
 
     @staticmethod
     def _next(stem: str, taken: Set[str]) -> str:

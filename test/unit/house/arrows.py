@@ -28,6 +28,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.records',
         'oracle.scope',
         'oracle.settings',
+        'oracle.control',
         'oracle.operator_hand',
         'oracle.OracleContainer',
         'oracle.oracle_of',

@@ -71,6 +71,20 @@ def test_machines_of_one_structure_share_a_name_unless_they_run_at_once(node):
     assert named(names, machine('A')) == 'task'
 
 
+@pytest.mark.parametrize('is_told_before', [False, True])
+def test_machines_that_shared_a_name_are_told_apart_once_they_run_at_once(node, is_told_before):
+    names = node('/task')
+    left, right, own = machine('A'), machine('A'), machine('A', name='task')
+    for each in (left, right):
+        if is_told_before:  # as oracle_run does
+            OracleContainer.wrap(each, name=names.name_of(each))
+        assert named(names, each) == 'task'
+    with names.running(left), names.running(left):
+        assert oracle_of(left).name == 'task'
+        assert named(names, right) == 'task_2'
+        assert named(names, own) == 'task', 'its program has named it'
+
+
 def test_machines_in_threads_at_once_are_told_apart(node):
     names = node('/task')
     begun = threading.Barrier(5)

@@ -104,6 +104,15 @@ class Jump(NamedTuple):
         return '{}/{}'.format(self.container, self.state) if self.container else self.state
 
 
+class StandingOrders(NamedTuple):
+    """What is asked of a machine, and of the next one in its place, until it is taken back."""
+
+    paused: bool
+    paused_by: str
+    breakpoints: Dict[str, PathPattern]
+    levels: Dict[str, Tuple[PathPattern, str]]
+
+
 class _OperatorStop(NamedTuple):
     """An operator's stop of the machine, until that goes on or its trial ends."""
 
@@ -274,6 +283,19 @@ class Control:
             return jump
 
     # -- of the operator
+
+    def orders(self) -> 'StandingOrders':
+        """Return what is asked beyond the present trial."""
+        with self._changed:
+            return StandingOrders(
+                self.paused, self.paused_by, dict(self._breakpoints), dict(self._levels)
+            )
+
+    def obey(self, orders: 'StandingOrders') -> None:
+        """Be asked this, and nothing else, beyond the present trial."""
+        with self._changed:
+            self.paused, self.paused_by, self._breakpoints, self._levels = orders
+            self._note_change()
 
     def pause(self, by: str = '') -> None:
         """Hold every container of the tree at its next state boundary."""

@@ -4,8 +4,9 @@ Also what one execution of any container begins and ends.
 """
 
 import time
+from contextlib import ExitStack, nullcontext
 from functools import lru_cache
-from typing import Callable, Dict, Iterable, List, Optional, Tuple
+from typing import Callable, ContextManager, Dict, Iterable, List, Optional, Tuple
 
 import smach
 from smach_oracle.forking import in_child
@@ -42,6 +43,7 @@ class ContainerRun(Execution):
 
     outcome: Optional[str] = None
     error: Optional[BaseException] = None
+    _around: ContextManager[object] = nullcontext()
     _is_executed = _is_trial = False
     _store: Optional[TrialStore] = None
 
@@ -50,6 +52,9 @@ class ContainerRun(Execution):
         node = self._node
         is_top = not node.has_running_ancestor()
         if is_top:
+            if node.parent is not None:
+                around = self._around = ExitStack()
+                around.enter_context(node.tree.around_nested_trial(node.machine))
             node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
         if not self.look_around():
             smach.logwarn('{}: does not begin, as {}'.format(node.path, node.why_left_behind()))
@@ -104,14 +109,15 @@ class ContainerRun(Execution):
             if self._is_executed:
                 self.end(self.outcome, error)
         finally:
-            if self._is_trial:
-                _running.remove(node)
-                if not node.tree.is_parents():
-                    self._end_trial(error)
-            elif self.outcome is None:
-                self.outcome = outcome_of_early_end(node)
-                if self._store is not None:
-                    self._store.let_go()
+            with self._around:
+                if self._is_trial:
+                    _running.remove(node)
+                    if not node.tree.is_parents():
+                        self._end_trial(error)
+                elif self.outcome is None:
+                    self.outcome = outcome_of_early_end(node)
+                    if self._store is not None:
+                        self._store.let_go()
 
     def _end_trial(self, error: Optional[BaseException]) -> None:
         node, outcome, store = self._node, self.outcome, self._store

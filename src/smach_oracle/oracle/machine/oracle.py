@@ -16,6 +16,7 @@ from ..settings.health import HealthFunction
 from ..settings.settings import Settings
 from .health_watch import ListenToHealth
 from .nesting import nodes_of
+from .tree import AroundTrial
 from .tree_node import TreeNode, node_of
 
 # -- the rates file of a tree, where the settings name one
@@ -196,6 +197,15 @@ class Oracle:
     @describe_failure.setter
     def describe_failure(self, describe: Callable[[smach.State], str]) -> None:
         self._node.tree.describe_failure = describe
+
+    @property
+    def around_nested_trial(self) -> AroundTrial:
+        """Return what is done around a trial of a nested machine that is executed by itself."""
+        return self._node.tree.around_nested_trial
+
+    @around_nested_trial.setter
+    def around_nested_trial(self, around: AroundTrial) -> None:
+        self._node.tree.around_nested_trial = around
 
     @property
     def trial_id(self) -> str:

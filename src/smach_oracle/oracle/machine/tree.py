@@ -6,7 +6,8 @@ These are the trial, its events, the expert and the threads that were left behin
 import itertools
 import threading
 import uuid
-from typing import Any, Callable, Dict, Mapping, Optional, Set, Tuple, Type
+from contextlib import nullcontext
+from typing import Any, Callable, ContextManager, Dict, Mapping, Optional, Set, Tuple, Type
 
 import smach
 from smach_oracle import forking
@@ -34,6 +35,15 @@ def log_error(text: str) -> None:
 def no_description(state: smach.State) -> str:
     """States say nothing of a failure by outcome, unless somebody knows how to ask them."""
     return ''
+
+
+# a context in which a machine has its trial
+AroundTrial = Callable[[smach.StateMachine], ContextManager[None]]
+
+
+def nothing_around(machine: smach.StateMachine) -> ContextManager[None]:
+    """Nobody needs to know of a trial, unless the tree is attached to a node."""
+    return nullcontext()
 
 
 def no_store() -> None:
@@ -81,6 +91,8 @@ class Tree:
         self.keep_marks: Callable[[], None] = no_store
         # what a state that failed by outcome says of it
         self.describe_failure: Callable[[smach.State], str] = no_description
+        # what is to be done around a trial of a nested machine that is executed by itself
+        self.around_nested_trial: AroundTrial = nothing_around
         # ids of containers and states that are executed as preconditions now
         self._preconditions: Set[Tuple[int, int]] = set()
         self.restarts, self.resumed = Restarts(), ResumedTrial()

@@ -1,19 +1,24 @@
 """The services by which operators hold the machines of a node, below `~oracle`.
 
 They are called in threads of rospy's. Machines are kept weakly: a script may build one for each
-trial.
+trial. What was asked of a path outlives its machine, and holds for the next one there.
 """
 
+import threading
 import weakref
-from typing import Any, Callable, Dict, List, Tuple
+from collections import OrderedDict
+from typing import Any, Callable, List, NamedTuple, Optional, Tuple
 
 import genpy
 import rospy
 
 from smach_oracle.oracle import OracleContainer, oracle_of
+from smach_oracle.oracle.control.control import Control
 from smach_oracle.oracle.identity import remove_identical
 from smach_oracle.oracle.operator_hand import OperatorHand
 from smach_oracle.oracle.records.events import Event, EventKind, OwnObserver
+from smach_oracle.oracle.scope.clock import Clock
+from smach_oracle.oracle.settings.names import PathPattern
 from smach_oracle.srv import (
     CommandMachine,
     CommandMachineRequest,
@@ -48,6 +53,23 @@ _CHANGES = frozenset(
 )
 
 
+MOST_PATHS = 100  # a script may give each trial a machine of another name
+
+# what a command asks of machines that are not there yet
+Asks = Callable[[Control], object]
+
+
+class _CommandedPath(NamedTuple):
+    """A path: the machines that run there, with the last one that has begun, and what is asked."""
+
+    machines: Tuple['weakref.ref[OracleContainer]', ...]
+    control: Control  # of the last one
+
+    def alive(self) -> List[OracleContainer]:
+        """Return the machines that are still there."""
+        return [machine for machine in (each() for each in self.machines) if machine is not None]
+
+
 class HandServer(OwnObserver):
     """Offers the hand on every machine that it watches."""
 
@@ -55,7 +77,9 @@ class HandServer(OwnObserver):
     without_it = 'consoles show an older state of the machine'
 
     def __init__(self) -> None:
-        self._machines: Dict[str, 'weakref.ref[OracleContainer]'] = {}  # by path
+        self._lock = threading.Lock()
+        self._known: 'OrderedDict[str, _CommandedPath]' = OrderedDict()  # the latest last
+        self._of_all = Control(Clock())  # what is asked of every machine, also of one to come
         self._observer = self._on_event  # the same object each time it is looked for
         self._status = ControlPublisher(self._hands)
         self._viewers = ViewerCommands()
@@ -71,20 +95,44 @@ class HandServer(OwnObserver):
         rospy.Service(NAMESPACE + name, kind, handle)
 
     def watch(self, machine: OracleContainer) -> None:
-        """Offer the hand on a top-level machine, in place of an earlier one of its path."""
-        oracle = oracle_of(machine)
-        self._machines[oracle.path] = weakref.ref(machine)
-        oracle.events.observers.append(self._observer)
+        """Offer the hand on a top-level machine."""
+        oracle_of(machine).events.observers.append(self._observer)
         self._viewers.listen_for(machine)
+        self.begins(machine)
+
+    def begins(self, machine: OracleContainer) -> None:
+        """Have the commands for the path of a machine reach it, as its next trial begins.
+
+        It obeys what was asked of the machine that was there before, or of all machines.
+        """
+        path, control = oracle_of(machine).path, OperatorHand(machine).control
+        with self._lock:
+            before = self._known.pop(path, None)
+            asked = self._of_all if before is None else before.control
+            running = [] if before is None else [m for m in before.alive() if m.is_running()]
+            self._let_go(machine)  # it may have had another name
+            self._known[path] = _CommandedPath(
+                tuple(weakref.ref(each) for each in running if each is not machine)
+                + (weakref.ref(machine),),
+                control,
+            )
+            if asked is not control:
+                control.obey(asked.orders())
+            while len(self._known) > MOST_PATHS:
+                self._known.popitem(last=False)
         self._status.changed()
 
     def forget(self, machine: OracleContainer) -> None:
         """Take the hand off a machine that is about to come out of its oracle."""
         remove_identical(oracle_of(machine).events.observers, self._observer)
-        for path, known in dict(self._machines).items():
-            if known() is machine:
-                del self._machines[path]
+        with self._lock:
+            self._let_go(machine)
         self._status.changed()
+
+    def _let_go(self, machine: OracleContainer) -> None:
+        for path, known in self._known.items():
+            others = tuple(each for each in known.machines if each() is not machine)
+            self._known[path] = known._replace(machines=others)
 
     def _on_event(self, event: Event) -> None:
         if event.kind in _CHANGES:
@@ -94,22 +142,25 @@ class HandServer(OwnObserver):
 
     def _hands(self) -> List[Tuple[str, OperatorHand]]:
         """The hands, by the paths of their machines."""
-        alive = [(path, known()) for path, known in sorted(self._machines.items())]
-        return [(path, OperatorHand(machine)) for path, machine in alive if machine is not None]
+        with self._lock:
+            known = sorted(self._known.items())
+        return [(path, OperatorHand(machine)) for path, at in known for machine in at.alive()]
 
     # -- in threads of rospy's
 
     def _on_command(self, name: str) -> Callable[[CommandMachineRequest], CommandMachineResponse]:
         def handle(request: CommandMachineRequest) -> CommandMachineResponse:
-            by = _caller(request)
-            if name in TREE_COMMANDS:
-                return CommandMachineResponse(
-                    *self._each(request.path, lambda hand: str(getattr(hand, name)(by)))
-                )
-            path = request.path.strip('/')
-            return CommandMachineResponse(
-                *self._each(path, lambda hand: str(getattr(hand, name)(path, by)))
-            )
+            by, path = _caller(request), request.path.strip('/')
+
+            def command(hand: OperatorHand) -> str:
+                where = () if name in TREE_COMMANDS else (path,)
+                return str(getattr(hand, name)(*where, by))
+
+            asks = _asks(name, by)
+            if asks is not None and not path and not self._hands():
+                self._ask_those_to_come(asks)
+                return CommandMachineResponse(True, 'no machine is there; the next one obeys')
+            return CommandMachineResponse(*self._each(path, command, asks))
 
         return handle
 
@@ -129,21 +180,29 @@ class HandServer(OwnObserver):
             act = hand.remove_breakpoint if request.remove else hand.set_breakpoint
             return act(request.pattern, _caller(request))
 
-        return SetBreakpointResponse(*self._each(request.path, command))
+        def asks(control: Control) -> None:
+            act = control.remove_breakpoint if request.remove else control.set_breakpoint
+            act(PathPattern(request.pattern))
+
+        return SetBreakpointResponse(*self._each(request.path, command, asks))
 
     def _on_autonomy(self, request: SetAutonomyRequest) -> SetAutonomyResponse:
         return SetAutonomyResponse(
             *self._each(
                 request.path,
                 lambda hand: hand.set_autonomy(request.pattern, request.level, _caller(request)),
+                lambda control: control.set_level(PathPattern(request.pattern), request.level),
             )
         )
 
-    def _each(self, path: str, command: Command, only: bool = False) -> Tuple[bool, str]:
+    def _each(
+        self, path: str, command: Command, asks: Optional[Asks] = None, only: bool = False
+    ) -> Tuple[bool, str]:
         """Command the machines that are meant.
 
         Return whether one of them has obeyed, and what they say.
 
+        :param asks: of machines to come, where every machine of the node is meant.
         :param only: one machine must be meant.
         """
         hands = self._hands()
@@ -153,8 +212,23 @@ class HandServer(OwnObserver):
                 path, ', '.join(each for each, _ in hands) or 'none; the first has yet to run'
             )
         told, refused = command_all(meant, command)
+        if told and asks is not None and not path.strip('/'):
+            self._ask_those_to_come(asks)
         self._status.changed()
         return bool(told), '; '.join(told or refused)
+
+    def _ask_those_to_come(self, asks: Asks) -> None:
+        with self._lock:
+            absent = [known.control for known in self._known.values() if not known.alive()]
+        for control in [self._of_all, *absent]:
+            asks(control)
+
+
+def _asks(name: str, by: str) -> Optional[Asks]:
+    """Return what a command asks of machines that are not there yet."""
+    if name in ('pause', 'step'):
+        return lambda control: control.pause(by)
+    return None if name == 'confirm' else lambda control: control.resume()
 
 
 def _is_in(path: str, machine: str) -> bool:

@@ -113,13 +113,15 @@ class TrialsPublisher:
     def watch(self, path: str, events: EventSource) -> None:
         """Count the trials of a top-level machine from now on, after those of an earlier one.
 
-        :param path: of the machine. A script may build a new one of that path for each trial.
+        :param path: of the machine, which may have had another one. A script may build a new
+            machine of that path for each trial.
         """
         with self._lock:
             latest = self._latest.setdefault(path, LatestTrial(path, self._changed.put))
             while len(self._latest) > MOST_MACHINES:
                 self._latest.popitem(last=False)
-        events.observers.append(latest)
+        others = [each for each in events.observers if not isinstance(each, LatestTrial)]
+        events.observers[:] = [*others, latest]
 
     def _run(self) -> None:
         while not rospy.is_shutdown():

@@ -1,5 +1,6 @@
 """Which machines of a node a command means."""
 
+import gc
 import threading
 
 import pytest
@@ -9,7 +10,12 @@ import smach
 from smach_oracle.oracle import OperatorHand, OracleContainer
 from smach_oracle.ros.hand import all_at_once, hand_server
 from smach_oracle.ros.hand.hand_server import HandServer
-from smach_oracle.srv import CommandMachineRequest, SendMachineRequest, SetBreakpointRequest
+from smach_oracle.srv import (
+    CommandMachineRequest,
+    SendMachineRequest,
+    SetAutonomyRequest,
+    SetBreakpointRequest,
+)
 
 
 class Silent:
@@ -92,9 +98,9 @@ def test_a_machine_that_hangs_delays_no_other_one(services, monkeypatch):
     hanging = Hanging(outcomes=['done', 'preempted'])
     with hanging:
         smach.StateMachine.add('A', smach.CBState(lambda ud: 'done', outcomes=['done']))
-    server = HandServer()
+    server, task = HandServer(), machine('task')
     server.watch(OracleContainer.wrap(hanging, name='a_first'))
-    server.watch(machine('task'))
+    server.watch(task)
     preempt = services['~oracle/preempt']
     replies = []
     asked = threading.Thread(
@@ -128,8 +134,8 @@ def test_what_is_refused_and_what_is_forgotten(services):
     assert stop(SetBreakpointRequest(pattern='A', remove=True)).ok
     assert not stop(SetBreakpointRequest(pattern='A', remove=True)).ok
     server.forget(one)
-    assert services['~oracle/resume'](CommandMachineRequest()).message == (
-        "there is no machine '' here; there are: none; the first has yet to run"
+    assert services['~oracle/resume'](CommandMachineRequest(path='task')).message == (
+        "there is no machine 'task' here; there are: none; the first has yet to run"
     )
     assert not one.events.observers
 
@@ -141,3 +147,81 @@ def test_who_calls_is_who_commands(services):
     request._connection_header = {'callerid': '/rosservice_1'}
     services['~oracle/pause'](request)
     assert OperatorHand(one).status().paused_by == '/rosservice_1'
+
+
+@pytest.mark.parametrize('path', ['task', ''])
+def test_the_next_machine_of_a_path_obeys_what_was_asked_there(services, path):
+    server, one, two = HandServer(), machine('task'), machine('task')
+    server.watch(one)
+    services['~oracle/pause'](CommandMachineRequest(path=path, by='eva'))
+    services['~oracle/breakpoint'](SetBreakpointRequest(path=path, pattern='A'))
+    services['~oracle/autonomy'](SetAutonomyRequest(path=path, pattern='A', level='confirm'))
+    server.watch(two)
+    status = OperatorHand(two).status()
+    assert (status.paused, status.paused_by, status.breakpoints) == (True, 'eva', ('A',))
+    assert status.autonomy == {'A': 'confirm'}
+    services['~oracle/resume'](CommandMachineRequest(path=path))
+    services['~oracle/breakpoint'](SetBreakpointRequest(path=path, pattern='A', remove=True))
+    services['~oracle/autonomy'](SetAutonomyRequest(path=path, pattern='A'))
+    server.begins(one)  # once more
+    status = OperatorHand(one).status()
+    assert (status.paused, status.breakpoints, status.autonomy) == (False, (), {})
+
+
+@pytest.mark.parametrize('path', ['task', ''])
+def test_a_machine_of_another_path_obeys_what_was_asked_of_all(services, path):
+    server, one, two, three = HandServer(), machine('task'), machine('task_2'), machine('task_3')
+    server.watch(one)
+    services['~oracle/step'](CommandMachineRequest(path=path))  # nothing waits: it pauses
+    services['~oracle/pause'](CommandMachineRequest(path=path))
+    services['~oracle/breakpoint'](SetBreakpointRequest(path=path, pattern='A'))
+    server.watch(two)
+    status = OperatorHand(two).status()
+    assert (status.paused, status.breakpoints) == ((False, ()) if path else (True, ('A',)))
+    services['~oracle/preempt'](CommandMachineRequest(path=path))
+    server.watch(three)
+    assert not is_paused(three)
+
+
+def test_between_two_machines_the_node_is_held(services):
+    server = HandServer()
+    server.watch(machine('task'))
+    gc.collect()  # nobody else has it
+    pause = services['~oracle/pause'](CommandMachineRequest(by='eva'))
+    assert (pause.ok, pause.message) == (True, 'no machine is there; the next one obeys')
+    again, other = machine('task'), machine('task_2')
+    for each in (again, other):
+        server.watch(each)
+        assert OperatorHand(each).status().paused_by == 'eva'
+
+
+def test_a_command_reaches_the_machine_that_has_begun_last_and_all_that_run(services, monkeypatch):
+    server, one, two = HandServer(), machine('task'), machine('task')
+    pause, resume = services['~oracle/pause'], services['~oracle/resume']
+    for each in (one, two, one):  # one, made first, has begun once more
+        server.watch(each)
+    pause(CommandMachineRequest())
+    assert (is_paused(one), is_paused(two)) == (True, False)
+    resume(CommandMachineRequest())
+    monkeypatch.setattr(type(one), 'is_running', lambda self: self is one)
+    server.watch(two)
+    pause(CommandMachineRequest())
+    assert is_paused(one) and is_paused(two)
+
+
+def test_a_machine_that_was_named_anew_goes_by_that_name_alone(services):
+    server, one = HandServer(), machine('morning')
+    server.watch(one)
+    OracleContainer.wrap(one, name='evening')
+    server.begins(one)
+    pause = services['~oracle/pause']
+    assert pause(CommandMachineRequest(path='evening')).ok
+    assert not pause(CommandMachineRequest(path='morning')).ok
+
+
+def test_paths_are_forgotten_after_many(services, monkeypatch):
+    monkeypatch.setattr(hand_server, 'MOST_PATHS', 2)
+    server, machines = HandServer(), [machine(name) for name in 'abc']
+    for each in machines:
+        server.watch(each)
+    assert [path for path, _ in server._hands()] == ['b', 'c']
