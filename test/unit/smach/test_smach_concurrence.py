@@ -39,6 +39,7 @@ def test_all_children_run_at_the_same_time_and_the_slowest_ends_it(said):
     assert "Concurrent state 'A' returned outcome 'done' on termination." in said('info')
 
 
+@pytest.mark.improvement
 def test_each_child_is_asked_once_for_its_preempt():
     class Counts(Fixed):
         def preempt_requested(self):
