@@ -6,7 +6,7 @@ from typing import Dict, Mapping, Optional, Protocol, Sequence, Tuple, cast
 
 import smach
 
-from ..machine.execution import runs_around
+from ..machine.execution import ends_program, runs_around
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..recovery.verdict import outcome_of_early_end
@@ -154,7 +154,8 @@ class Branch(smach.Container):
                 self._be_idle()
             return outcome
         except (SystemExit, KeyboardInterrupt) as err:
-            self._oracle.tree.early_end.of_program = err
+            if ends_program(err):
+                self._oracle.tree.early_end.of_program = err
             self._oracle.records.drop_snapshots()
             self._be_idle()
             raise

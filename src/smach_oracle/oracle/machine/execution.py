@@ -209,6 +209,10 @@ def why_no_outcome(outcome: object, error: Optional[BaseException]) -> str:
     return NO_OUTCOME if outcome is None else ''
 
 
+# rospy raises it in a sleep during which /clock jumps back, and derives it from KeyboardInterrupt
+_CLOCK_JUMPED = 'ROSTimeMovedBackwardsException'
+
+
 def ends_program(error: Optional[BaseException]) -> bool:
     """Whether sys.exit or Ctrl-C is behind an error: the program is to end, and nothing failed.
 
@@ -216,4 +220,6 @@ def ends_program(error: Optional[BaseException]) -> bool:
     """
     while isinstance(error, (smach.InvalidStateError, smach.InvalidUserCodeError)):
         error = error.__cause__ or (None if error.__suppress_context__ else error.__context__)
+    if any(each.__name__ == _CLOCK_JUMPED for each in type(error).__mro__):
+        return False
     return isinstance(error, (SystemExit, KeyboardInterrupt))
