@@ -288,6 +288,11 @@ class TrialStore:
             self._let_go()
             raise
 
+    @staticmethod
+    def can_go_on(why: TrialEnd) -> bool:
+        """Whether a trial that ended so may be resumed."""
+        return why in _CAN_GO_ON
+
     def end(self, why: TrialEnd, outcome: str, at: float) -> None:
         """Store the last of the trial, and let go of the store."""
         if self._goes_on_from is not None:
@@ -295,7 +300,7 @@ class TrialStore:
         self._observe_no_more()
         if self._observer is not None:
             self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
-        self._close(None if why in _CAN_GO_ON else Ending(at, outcome))
+        self._close(None if self.can_go_on(why) else Ending(at, outcome))
 
     def let_go(self) -> None:
         """Let go of the store, as its trial does not begin. What it holds can still go on."""

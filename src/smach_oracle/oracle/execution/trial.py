@@ -20,7 +20,7 @@ from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
 from ..records.events import EventKind
-from ..records.facts import ENDED_BY, INPUTS, ORIGIN, TrialEnd
+from ..records.facts import CAN_GO_ON, ENDED_BY, INPUTS, ORIGIN, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.verdict import outcome_of_early_end
@@ -136,13 +136,14 @@ class ContainerRun(Execution):
                 why is TrialEnd.OUTCOME and outcome in node.in_force.failing
             )
             settle_ways(node, False if is_lost and not node.execution.was_preempted else None)
+        goes_on = {CAN_GO_ON: True} if store is not None and store.can_go_on(why) else {}
         with_rates = bool(node.settings.rates_file)
         learned = {'learned': learned_by(nodes_of(node.machine))} if with_rates else {}
         node.emit(
             EventKind.TRIAL_END,
             outcome=outcome or '',
             text=why_no_outcome(outcome, error),
-            data={ENDED_BY: why.value, **learned},
+            data={ENDED_BY: why.value, **goes_on, **learned},
         )
         save_rates(node)
         if store is not None:

@@ -20,6 +20,8 @@ TAKEN_UP = 'taken_up'
 # keys in the data of TRIAL_START: where and with what it began, and plain values of its userdata
 ORIGIN, INPUTS = 'origin', 'inputs'
 ENDED_BY = 'ended_by'  # key in the data of TRIAL_END
+# key in the data of TRIAL_END: true where the trial is stored, and another program may resume it
+CAN_GO_ON = 'can_go_on'
 BRANCHES = 'branches'  # key in the data of CONTAINER_START: states that have oracles of their own
 LAST_SEQ = 'last_seq'  # key in the data of RESUMED: number of the last event that was stored
 # key in the data of TRANSITION: true where it says nothing of how good the state is

@@ -2,11 +2,13 @@
 
 import fcntl
 import glob
+import json
 import os
 from typing import Callable, Dict, List, NamedTuple, Set, Tuple
 
 from smach_oracle.forking import unlock
 from smach_oracle.msg import OracleEvent
+from smach_oracle.oracle.records.facts import CAN_GO_ON, ENDED_BY, TrialEnd
 
 from .limits import KnownBag, Plan, Removal
 
@@ -87,12 +89,18 @@ def _trials_of(path: str) -> _TrialsOfBag:
                     waiting.add(event.query_id)
                 elif event.kind in _ENDS_QUESTION:
                     waiting.discard(event.query_id)
-                elif event.kind == OracleEvent.TRIAL_END:
+                elif event.kind == OracleEvent.TRIAL_END and not _can_go_on(event):
                     ended.append(event.trial_id)
     except Exception as err:  # a damaged file can make rosbag raise anything
         return _TrialsOfBag((), (), 'it cannot be read: {!r}'.format(err))
     done = tuple(trial for trial in ended if not trials[trial])
     return _TrialsOfBag(tuple(trials), done, '' if trials else NOT_OURS)
+
+
+def _can_go_on(end: OracleEvent) -> bool:
+    data = json.loads(end.data or '{}')
+    # bags of earlier versions tell only that it is asked about
+    return bool(data.get(CAN_GO_ON)) or data.get(ENDED_BY) == TrialEnd.KEPT.value
 
 
 def _is_of_events(topic: str, kind: str, md5sum: str, definition: str, header: object) -> bool:

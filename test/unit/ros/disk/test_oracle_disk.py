@@ -111,6 +111,24 @@ def test_never_a_trial_that_has_not_ended(folder, capsys):
     assert stays(folder, bag, capsys, 'trial stopped has not ended')
 
 
+@pytest.mark.parametrize('data', [{'ended_by': 'stopped', 'can_go_on': True}, {'ended_by': 'kept'}])
+def test_never_a_stored_trial_that_may_be_resumed(folder, capsys, data):
+    tell = [(EventKind.TRIAL_END, {'data': data})]
+    bag = record(folder, 'a', OLD, tell, ends=False)
+    assert stays(folder, bag, capsys, 'trial a has not ended')
+    # the program that resumed it has ended it
+    record(folder, 'a', OLD)
+    assert main([str(folder), *ONE_MONTH, '--delete']) == 0
+    assert not list(folder.glob('*.bag'))
+
+
+def test_a_trial_that_was_stopped_and_is_in_no_store_goes(folder):
+    tell = [(EventKind.TRIAL_END, {'data': {'ended_by': 'stopped'}})]
+    record(folder, 'a', OLD, tell, ends=False)
+    assert main([str(folder), *ONE_MONTH, '--delete']) == 0
+    assert not list(folder.glob('*.bag'))
+
+
 def test_never_a_trial_whose_question_is_open(folder, capsys):
     opened = (EventKind.QUERY_OPENED, {'state': 'PICK', 'query_id': 'q'})
     end = (EventKind.TRIAL_END, {'outcome': 'aborted'})
