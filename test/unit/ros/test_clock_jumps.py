@@ -1,4 +1,4 @@
-"""A sleep that ends as /clock jumps back is a failure of its state. rospy's shutdown is none."""
+"""A sleep that ends as /clock jumps back is a failure of its state. rospy's shutdown is not."""
 
 import pytest
 import rospy
