@@ -2,15 +2,17 @@
 
 import threading
 import time
+from collections import OrderedDict
 from typing import Any, Callable, Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import rospy
 
-from smach_oracle.msg import OpenQuery
+from smach_oracle.msg import ExpertQueryGoal, OpenQuery
 from smach_oracle.oracle.errors import OracleError, SettingsError
 from smach_oracle.oracle.settings import checks
 from smach_oracle.oracle.settings.paths import path_of
 from smach_oracle.ros.command_line import parameters_only
+from smach_oracle.ros.expert.open_questions import REMEMBERED
 from smach_oracle.ros.expert.question_messages import to_decision
 from smach_oracle.ros.loaded_settings import LoadedSettings
 from smach_oracle.ros.master_watch import start_master_watch
@@ -71,6 +73,7 @@ class ScriptedExpert:
         self._charge_time = charge_time
         self._charged = False  # its work has begun there
         self._planned: Dict[str, _PlannedAnswer] = {}
+        self._chosen: 'OrderedDict[str, Rule]' = OrderedDict()  # by question, also of settled ones
         self._stopped = False
         self._thread = threading.Thread(target=self._run, name='scripted expert', daemon=True)
         self._thread.start()
@@ -85,13 +88,17 @@ class ScriptedExpert:
         version = 0
         while not (self._stopped or rospy.is_shutdown()):
             version = self._front_end.wait_for_change(version, self._pause_s())
-            self._take_in({listed.key: listed for listed in self._front_end.questions()})
-            self._charge()
-            now_s = self._now()
-            for key, planned in dict(self._planned).items():
-                if planned.due_s <= now_s:
-                    self._answer(key, planned)
-            self._charge()
+            self.look()
+
+    def look(self) -> None:
+        """Take in what is open now, and answer what is due. Its own thread calls this."""
+        self._take_in({listed.key: listed for listed in self._front_end.questions()})
+        self._charge()
+        now_s = self._now()
+        for key, planned in dict(self._planned).items():
+            if planned.due_s <= now_s:
+                self._answer(key, planned)
+        self._charge()
 
     def _pause_s(self) -> float:
         due_s = min((planned.due_s for planned in self._planned.values()), default=float('inf'))
@@ -109,11 +116,7 @@ class ScriptedExpert:
 
     def _begin(self, key: str, listed: ListedQuestion) -> None:
         goal = listed.goal
-        rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
-        if not still_runs(goal):
-            rule = self._rules.next(
-                goal.robot, goal.trial_id, goal.container_path, goal.failed_state
-            )
+        rule = self._chosen_rule(key, goal)
         why_not = rule.why_not(goal.choices)
         if why_not:
             rospy.logwarn('The rule for %s does not answer: %s', goal.failed_state, why_not)
@@ -127,6 +130,20 @@ class ScriptedExpert:
                 self._front_end.claim(listed)
             except ServerGoneError as err:
                 rospy.logwarn('%s', err)
+
+    def _chosen_rule(self, key: str, goal: ExpertQueryGoal) -> Rule:
+        """Return the rule for a question, the same one when it comes again."""
+        if key not in self._chosen:
+            rule = Rule(IGNORE)  # of a state that still runs: rules are for failures
+            if not still_runs(goal):
+                rule = self._rules.next(
+                    goal.robot, goal.trial_id, goal.container_path, goal.failed_state
+                )
+            self._chosen[key] = rule
+        self._chosen.move_to_end(key)
+        while len(self._chosen) > REMEMBERED:
+            self._chosen.popitem(last=False)
+        return self._chosen[key]
 
     def _answer(self, key: str, planned: _PlannedAnswer) -> None:
         try:
