@@ -92,7 +92,7 @@ class ScriptedExpert:
 
     def look(self) -> None:
         """Take in what is open now, and answer what is due. Its own thread calls this."""
-        self._take_in({listed.key: listed for listed in self._front_end.questions()})
+        self._take_in()
         self._charge()
         now_s = self._now()
         for key, planned in dict(self._planned).items():
@@ -106,12 +106,18 @@ class ScriptedExpert:
             return _IDLE_S if due_s == float('inf') else _LOOK_S
         return max(0.0, min(_IDLE_S, due_s - time.monotonic()))
 
-    def _take_in(self, questions: Mapping[str, ListedQuestion]) -> None:
-        for key in set(self._planned) - set(questions):
+    def _take_in(self) -> None:
+        """Plan an answer for each question that others leave to it, and for no other one."""
+        free = {
+            listed.key: listed
+            for listed in self._front_end.questions()
+            if listed.status == OpenQuery.PENDING
+            or (listed.status == OpenQuery.CLAIMED and listed.holder == self._front_end.expert)
+        }
+        for key in set(self._planned) - set(free):
             del self._planned[key]
-        for key, listed in questions.items():
-            free = listed.status == OpenQuery.PENDING or listed.holder == self._front_end.expert
-            if key not in self._planned and free and listed.status != OpenQuery.INTERFACE_RUNNING:
+        for key, listed in free.items():
+            if key not in self._planned:
                 self._begin(key, listed)
 
     def _begin(self, key: str, listed: ListedQuestion) -> None:

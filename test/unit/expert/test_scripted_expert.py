@@ -1,4 +1,6 @@
-"""The scripted expert beside others: its server is restarted; no master."""
+"""The scripted expert beside others: its server is restarted, or ann works on its question; no
+master.
+"""
 
 import pytest
 import rospy
@@ -8,6 +10,7 @@ from smach_oracle.expert import scripted_expert as module
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.expert.rules import Rules
 from smach_oracle.expert.scripted_expert import ScriptedExpert
+from smach_oracle.msg import ExpertDecision
 from smach_oracle.ros.expert.open_questions import REMEMBERED, OpenQuestions
 from smach_oracle.ros.expert.question_messages import to_goal
 from smach_oracle.srv import ClaimQueryRequest
@@ -100,3 +103,58 @@ def test_rules_of_old_questions_are_forgotten(front_end):
         expert.look()
     assert len(expert._chosen) == REMEMBERED
     assert len(expert._planned) <= 1, 'the others are settled'
+
+
+def test_a_question_that_ann_took_over_is_answered_once_her_claim_has_run_out(front_end):
+    expert = ScriptedExpert(front_end, Rules.parse(TWO_RULES))
+    front_end.ask('q1')
+    look_after(expert, 2.0)
+    assert front_end.questions()[0].holder == 'scripted'
+    assert front_end.claim_of('ann', ClaimQueryRequest.TAKE_OVER).ok
+    look_after(expert, LEASE_S - 0.5)
+    assert front_end.questions()[0].holder == 'ann'
+    look_after(expert, 1.0)
+    assert front_end.questions()[0].holder == 'scripted', 'free again'
+    look_after(expert, 8.0)
+    assert front_end.answers() == ['first rule']
+
+
+@pytest.mark.parametrize('delay_s', [0.0, 1.0])
+def test_so_is_one_that_ann_claimed_before_its_list_said_so(front_end, delay_s):
+    expert = ScriptedExpert(front_end, Rules.parse({'PICK': dict(FIRST, delay_s=delay_s)}))
+    front_end.ask('q1')
+    old = front_end.questions()
+    front_end.claim_of('ann')
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(front_end, 'questions', lambda: old)
+        look_after(expert, 0.1)
+    assert front_end.questions()[0].holder == 'ann'
+    look_after(expert, 0.1)
+    front_end.claim_of('ann', ClaimQueryRequest.RELEASE)
+    look_after(expert, 0.1)
+    assert not delay_s or front_end.questions()[0].holder == 'scripted'
+    look_after(expert, delay_s + 0.1)
+    assert front_end.answers() == ['first rule']
+
+
+def test_ann_s_answer_stands_and_leaves_the_second_rule_to_the_next_question(front_end):
+    expert = ScriptedExpert(front_end, Rules.parse(TWO_RULES))
+    front_end.ask('q1')
+    look_after(expert, 1.0)
+    front_end.claim_of('ann', ClaimQueryRequest.TAKE_OVER)
+    look_after(expert, 1.0)
+    front_end.server.answer('q1', ExpertDecision(kind=ExpertDecision.GIVE_UP, by='ann', why='hers'))
+    look_after(expert, 10.0)
+    front_end.ask('q2')
+    look_after(expert, 1.0)
+    assert front_end.answers() == ['hers', 'second rule']
+
+
+def test_an_answer_that_does_not_fit_is_given_once(front_end):
+    given = []
+    answer = front_end.answer
+    front_end.answer = lambda *what: given.append(what) or answer(*what)
+    expert = ScriptedExpert(front_end, Rules.parse({'PICK': {'kind': 'goto', 'state': 'NOWHERE'}}))
+    front_end.ask('q1')
+    look_after(expert, 5.0)
+    assert len(given) == 1 and front_end.answers() == []
