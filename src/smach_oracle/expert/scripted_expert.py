@@ -96,8 +96,11 @@ class ScriptedExpert:
         self._charge()
         now_s = self._now()
         for key, planned in dict(self._planned).items():
+            latest_s = now_s + max(planned.rule.delay_s, _RETRY_S)
             if planned.due_s <= now_s:
                 self._answer(key, planned)
+            elif latest_s < planned.due_s < float('inf'):  # ROS time has jumped back
+                self._planned[key] = planned._replace(due_s=latest_s)
         self._charge()
 
     def _pause_s(self) -> float:

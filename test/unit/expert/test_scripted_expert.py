@@ -1,5 +1,5 @@
-"""The scripted expert beside others: its server is restarted, or ann works on its question; no
-master.
+"""The scripted expert beside others: its server is restarted, ann works on its question, the clock
+jumps; no master.
 """
 
 import pytest
@@ -158,3 +158,15 @@ def test_an_answer_that_does_not_fit_is_given_once(front_end):
     front_end.ask('q1')
     look_after(expert, 5.0)
     assert len(given) == 1 and front_end.answers() == []
+
+
+@pytest.mark.parametrize('jumped_to_s', [0.0, 998.0])
+def test_a_clock_that_jumps_back_delays_an_answer_no_longer_than_its_delay(front_end, jumped_to_s):
+    expert = ScriptedExpert(front_end, Rules.parse({'PICK': FIRST}), answer_delay_s=6.0)
+    front_end.ask('q1')
+    look_after(expert, 4.0)
+    Clock.now_s = jumped_to_s
+    look_after(expert, 5.5)
+    assert front_end.answers() == [], 'the delay begins again'
+    look_after(expert, 1.0)
+    assert front_end.answers() == ['first rule']
