@@ -65,7 +65,7 @@ class InterfaceDialog:
                 return self._ended(
                     self._interface.give_up(self._ask('  reason (optional): ', listed))
                 )
-            elif number.isdigit() and 1 <= int(number) <= len(outcomes):
+            elif number.isdecimal() and 1 <= int(number) <= len(outcomes):
                 return self._ended(
                     self._interface.finish(
                         outcomes[int(number) - 1],

@@ -140,7 +140,7 @@ class Terminal:
         _quit_on(line)
         if self._operate(line):
             return None
-        if line.isdigit() and 1 <= int(line) <= len(waiting):
+        if line.isdecimal() and 1 <= int(line) <= len(waiting):
             return waiting[int(line) - 1]
         self._say('{!r} is not one of 1 to {}, q'.format(line, len(waiting)), 'red')
         return None

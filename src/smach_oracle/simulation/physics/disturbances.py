@@ -334,7 +334,7 @@ def _check(disturbance: Disturbance, scene: Scene, robot: Pr2Body) -> None:
     wrong = ''
     if kind not in OPTIONS:
         wrong = 'unknown kind; allowed: {}'.format(', '.join(OPTIONS))
-    elif event not in EVENTS or not number.isdigit() or int(number) < 1:
+    elif event not in EVENTS or not number.isdecimal() or int(number) < 1:
         wrong = 'unknown event {!r}; allowed: {}, each with :NUMBER'.format(
             disturbance.after, ', '.join(EVENTS)
         )

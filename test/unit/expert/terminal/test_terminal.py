@@ -311,8 +311,9 @@ def test_a_question_taken_over_by_another_is_told_and_can_be_taken_back():
 
 def test_of_several_questions_one_is_picked_by_its_number():
     front_end = FakeFrontEnd(goal('q1'), goal('q2', failed_state='OPEN_FRIDGE'))
-    shown = converse(front_end, ENTER.join(['7', '2', '1', '', 'q', '']))
-    assert "'7' is not one of 1 to 2" in shown and 'PICK_AND_PLACE/OPEN_FRIDGE' in shown
+    shown = converse(front_end, ENTER.join(['7', '²', '2', '1', '', 'q', '']))
+    assert "'7' is not one of 1 to 2" in shown and "'²' is not one of 1 to 2" in shown
+    assert 'PICK_AND_PLACE/OPEN_FRIDGE' in shown
     assert front_end.claims[0] == ('q2', False)
 
 

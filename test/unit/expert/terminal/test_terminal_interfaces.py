@@ -6,13 +6,14 @@ from typist import ENTER
 
 def test_an_interface_is_chosen_its_output_shown_and_it_is_finished():
     front_end, interface, shown = talk(
-        ['i1', '', 'o', 'f9', 'f1', 'too early', 'f1', 'in the hand', 'q', '']
+        ['i1', '', 'o', 'f9', 'f²', 'f1', 'too early', 'f1', 'in the hand', 'q', '']
     )
     assert front_end.decisions[0].interface == interface.name == 'assist'
     assert interface.done == [('finish', 'succeeded', 'in the hand'), 'stopped']
     for part in (
         '| Now do the work of PICK',
         "'f9' is not one of f1",
+        "'f²' is not one of f1",
         'Refused: the gripper is empty',
         'The interface has ended.',
         'DETECT runs.',

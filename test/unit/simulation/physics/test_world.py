@@ -188,6 +188,7 @@ def test_clients_are_given_back(world):
             scene(disturbances=(Disturbance('dim', 'lunch'),)),
             "'dim': unknown event 'lunch'; allowed: start, follow",
         ),
+        (scene(disturbances=(Disturbance('dim', 'see:²'),)), "'dim': unknown event 'see:²'"),
         (
             scene(disturbances=(Disturbance('dim', 'see', near=Near((0.0, 0.0, math.inf), 1.0)),)),
             'near is .*allowed: a place of finite m',
