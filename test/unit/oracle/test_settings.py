@@ -95,6 +95,8 @@ def test_the_file_that_shows_the_settings_has_their_defaults():
         ({'history_length': 0}, 'history_length', 0, 'from 1'),
         ({'oracle_label': ''}, 'oracle_label', '', 'not empty'),
         ({'rates_file': 5}, 'rates_file', 5, 'string'),
+        ({'rates_file': '\ud800'}, 'rates_file', '\ud800', 'the path of a file'),
+        ({'checkpoint': {'file': '~\0'}}, 'checkpoint.file', '~\0', 'the path of a file'),
         ({'states': ['A']}, 'states', ['A'], 'mapping'),
         ({'states': {5: {}}}, 'states', 5, 'strings'),
         ({'states': {'PICK': {'memory': 'ten'}}}, 'states.PICK.memory', 'ten', 'whole number'),

@@ -38,7 +38,7 @@ from ..decision.ways import Prices
 from ..errors import SettingsError
 from ..identity import attribute_of
 from ..number_checks import is_number, is_whole
-from .paths import path_of
+from .paths import can_be_path, path_of
 from .written import as_text, as_value, read_otherwise
 
 T = TypeVar('T')
@@ -112,9 +112,12 @@ text = _text_that('a string', lambda word: True)  # empty or not
 label = _text_that('a string that is not empty', bool)
 
 
+_path = _text_that('the path of a file', can_be_path)
+
+
 def file(key: str, value: object) -> str:
     """Check for a path, empty or not, and return it with `~` filled in."""
-    return path_of(text(key, value))
+    return path_of(_path(key, text(key, value)))
 
 
 def words(key: str, value: object) -> Tuple[str, ...]:

@@ -13,6 +13,14 @@ def path_of(text: str) -> str:
     return os.path.expanduser(text)
 
 
+def can_be_path(text: str) -> bool:
+    """Whether the system can be asked for a file of this name."""
+    try:
+        return b'\0' not in os.fsencode(text)
+    except UnicodeEncodeError:
+        return False
+
+
 def check_writable(key: str, path: str, replaced: bool = False) -> None:
     """Find out before it is needed whether a file can be written.
 
