@@ -120,6 +120,12 @@ def test_the_file_that_shows_the_settings_has_their_defaults():
         ({'states': {'PICK': {'preconditions': 'A'}}}, 'states.PICK.preconditions', 'A', 'list'),
         ({'interfaces': {'hand': {}}}, 'interfaces.hand.action', None, 'SharedAutonomy'),
         (
+            {'interfaces': {'hand': {'action': 'bad name!'}}},
+            'interfaces.hand.action',
+            'bad name!',
+            'the name of an action, such as /hand',
+        ),
+        (
             {'interfaces': {'hand': {'action': 'a', 'state': []}}},
             'interfaces.hand.state',
             [],

@@ -66,7 +66,7 @@ states:
 expert:
   on_no_answer: {{goto: {0}}}
   interfaces:
-    {0}: {{action: {0}, description: {0}, states: [{0}]}}
+    {0}: {{action: hand, description: {0}, states: [{0}]}}
 """
 
 
@@ -83,7 +83,6 @@ def test_a_name_is_taken_as_it_is_written_wherever_a_name_is_expected(read, word
         *pair.labels(),
         single.name,
         offer.name,
-        offer.action,
         offer.description,
         *states,
         *settings.failing_outcomes,
@@ -97,6 +96,12 @@ def test_a_name_is_taken_as_it_is_written_wherever_a_name_is_expected(read, word
     ]
     assert found == [word] * len(found)
     assert {type(each) for each in found} == {str}
+
+
+@pytest.mark.parametrize('word', [word for word in WORDS if word.isalpha()])
+def test_the_name_of_an_action_is_taken_as_it_is_written(read, word):
+    ((offer, _),) = read('expert: {{interfaces: {{hand: {{action: {}}}}}}}'.format(word)).interfaces
+    assert offer.action == word and type(offer.action) is str
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ launch/oracle.yaml and doc/settings.md of those of the executive.
 """
 
 import math
+import re
 from copy import copy
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -118,6 +119,16 @@ _path = _text_that('the path of a file', can_be_path)
 def file(key: str, value: object) -> str:
     """Check for a path, empty or not, and return it with `~` filled in."""
     return path_of(_path(key, text(key, value)))
+
+
+# of ROS: a name from the root, of the node's own, or relative
+_GRAPH_NAME = re.compile(r'(~/?|/)?[A-Za-z]\w*(/[A-Za-z0-9_]+)*', re.ASCII)
+
+
+def graph_name(allowed: str) -> Check[str]:
+    """Check for a name of ROS. Its SettingsError says `allowed`."""
+    check = _text_that(allowed, lambda word: _GRAPH_NAME.fullmatch(word) is not None)
+    return lambda key, value: check(key, label(key, value))
 
 
 def words(key: str, value: object) -> Tuple[str, ...]:

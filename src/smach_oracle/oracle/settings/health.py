@@ -18,11 +18,10 @@ from .written import as_text, as_value
 # no arguments. True or '' is well, else what is wrong
 HealthFunction = Callable[[], Union[bool, str]]
 WORST = ('ok', 'warn')
-# of ROS: a name from the root, of the node's own, or relative
-_GRAPH_NAME = re.compile(r'(~/?|/)?[A-Za-z]\w*(/[A-Za-z0-9_]+)*', re.ASCII)
 _FIELD = re.compile(r'[A-Za-z_]\w*(\.\w+)*')
 _ALLOWED = 'a mapping with one of the keys topic, diagnostics and function'
 _NUMBER = values.number(-math.inf, math.inf, 'a number')
+_TOPIC = values.graph_name('the name of a topic, such as /motors_on')
 _AGE = values.number(0.001, math.inf, 'seconds from 0.001')
 
 
@@ -97,9 +96,7 @@ def _condition(key: str, given: object, resolver: Optional[Resolver]) -> HealthC
 
 
 def _topic(prefix: str, entry: Mapping[str, object]) -> HealthCondition:
-    topic = values.label(prefix + 'topic', entry['topic'])
-    if not _GRAPH_NAME.fullmatch(topic):
-        raise SettingsError(prefix + 'topic', topic, 'the name of a topic, such as /motors_on')
+    topic = _TOPIC(prefix + 'topic', entry['topic'])
     field = as_text(entry.get('field', 'data'))
     if not isinstance(field, str) or not _FIELD.fullmatch(field):
         raise SettingsError(
