@@ -177,15 +177,17 @@ class BagCatalogue:
 
     def _forget(self, gone: Iterable[str]) -> None:
         for path in gone:
-            del self._read[path]
+            self._read.pop(path, None)
             with self._lock:
                 self._broken.pop(path, None)
                 self._drop(path)
 
     def _drop(self, path: str) -> None:
-        """Forget the trials of a bag, with the lock held."""
+        """Forget the trials of a bag, with the lock held. Their other bags are read again."""
         for trial_id in [name for name, each in self._trials.items() if path in each.summary.bags]:
-            del self._trials[trial_id]
+            for bag in self._trials.pop(trial_id).summary.bags:
+                if bag != path:
+                    self._read.pop(bag, None)
 
     def _read_bag(self, path: str, state: FileState) -> None:
         """Read one bag."""

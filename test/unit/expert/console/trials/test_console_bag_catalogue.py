@@ -119,6 +119,21 @@ def test_a_trial_in_two_bags_is_one(folder, tmp_path):
     assert [event.seq for event in events] == list(range(len(events)))
 
 
+@pytest.mark.parametrize('end', ['removed', 'overwritten'])
+def test_a_trial_that_loses_one_of_its_bags_is_read_from_the_other(folder, tmp_path, end):
+    for name in ('one', 'two'):
+        shutil.copytree(folder, str(tmp_path / name))
+    catalogue, section = catalogue_of(str(tmp_path))
+    for bag in (tmp_path / 'one').glob('*.bag'):
+        bag.unlink() if end == 'removed' else bag.write_bytes(b'overwritten')
+    catalogue.scan()
+    if end == 'overwritten':
+        catalogue.scan()  # the other bags were not due as these were found broken
+    assert section()['table'][0]['trials'] == len(section()['trials']) == TRIALS
+    trial = catalogue.find(section()['trials'][0]['number'])
+    assert [os.path.dirname(bag) for bag in trial.summary.bags] == [str(tmp_path / 'two')]
+
+
 def test_number_and_size_are_bounded(folder, monkeypatch):
     monkeypatch.setattr(bag_catalogue, 'MOST_BAGS', 5)
     monkeypatch.setattr(bag_catalogue, 'SHOWN_TRIALS', 3)
