@@ -130,6 +130,23 @@ class OracleControlTest(unittest.TestCase):
             self.assertEqual(task.wait(), 0, task.output())
             self.assertIn('OBEYS', task.output())
 
+    def test_of_two_alike_the_one_that_runs_obeys(self) -> None:
+        built = SCRIPT[SCRIPT.index('inner =') :]
+        in_turn = """
+for each in first, sm, first:
+    print('OUTCOME', each.execute(), flush=True)
+"""
+        task = self.run_task(SCRIPT + 'first = sm\n' + built + in_turn)
+        task.go_on()
+        self.assertTrue(wait_for(lambda: task.output().count('RUNS FIRST') == 2), task.output())
+        task.go_on()
+        self.assertTrue(wait_for(lambda: task.output().count('RUNS FIRST') == 3), task.output())
+        self.assertEqual(self.call('preempt'), 'task is asked to stop')
+        self.assertEqual(self.call('pause'), 'task is paused; runs to its end: FIRST in task')
+        self.call('resume')
+        task.go_on()
+        self.assertEqual(task.wait(), 0, task.output())
+
     def test_a_machine_that_is_built_anew_is_held_as_the_one_before(self) -> None:
         built = SCRIPT[SCRIPT.index('inner =') :]
         task = self.run_task(SCRIPT + EXECUTE + built + EXECUTE)

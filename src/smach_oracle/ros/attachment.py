@@ -143,6 +143,15 @@ class Attachments:
         """Whether a machine is attached to the node."""
         return machine in self._on_ros
 
+    def shows(self, machine: OracleContainer) -> bool:
+        """Whether a machine is attached, and shown by the path that it has now.
+
+        It may have another name since. Another machine of the path may have run.
+        """
+        path = oracle_of(machine).path
+        shown = self._shown.get(path)
+        return self._on_ros.get(machine) == path and (shown is None or shown() is machine)
+
     @contextmanager
     def trial(self, machine: smach.StateMachine) -> Iterator[None]:
         """Keep the bags open until the trial has told its end.
@@ -182,15 +191,16 @@ class Attachments:
         )
 
     def attach(self, machine: OracleContainer) -> None:
-        """Attach a top-level machine. It does nothing the second time.
+        """Attach a top-level machine, and show it by its path.
 
         Outside a ROS node it only records, where that is asked for.
 
         :raises OSError: where the folder for the bags cannot be made or written.
         """
-        if self.has(machine):
-            return
         with self._lock:
+            if self.has(machine):
+                self._show(machine)
+                return
             node = rospy.core.is_initialized() and not rospy.core.is_shutdown_requested()
             plan = self._plan_recording(node)  # first, since it may raise
             if oracle_of(machine).settings.checkpoint:
@@ -204,21 +214,9 @@ class Attachments:
                 self._replays.watch(oracle_of(machine).events)  # behind the recorder
 
     def begins(self, machine: OracleContainer) -> None:
-        """Have what goes by the path of an attached machine mean this one, for its next trial.
-
-        Another machine of the path may have run since. The machine may have another name now.
-        """
-        if not self.has(machine) or rospy.core.is_shutdown_requested():
-            return
-        path = oracle_of(machine).path
-        with self._lock:
-            if self._on_ros.get(machine) != path:
-                self._show(machine)
-            shown = self._shown.get(path)
-            if shown is not None and shown() is not machine:
-                self._introspect(machine)
-            if self._hand is not None:
-                self._hand.begins(machine)
+        """Have operators' commands reach a machine, as its next trial begins."""
+        if self._hand is not None and self.has(machine):
+            self._hand.begins(machine)
 
     def detach(self, machine: OracleContainer) -> None:
         """Let go of a top-level machine that has ended and is about to come out of its oracle.
@@ -292,13 +290,13 @@ class Attachments:
     def _show(self, machine: OracleContainer) -> None:
         """Show a machine by its path, and not by an earlier one."""
         oracle, before = oracle_of(machine), self._on_ros.get(machine)
-        self._on_ros[machine] = oracle.path
         if self._told_trials is not None:
             self._told_trials.watch(oracle.path, oracle.events)
         if before is not None:
             self._hide(machine, before)
         if self._wants_introspection and not has_introspection(machine):
             self._introspect(machine)
+        self._on_ros[machine] = oracle.path
 
     def _hide(self, machine: OracleContainer, path: str) -> None:
         """Stop the introspection of a machine by this path."""

@@ -164,7 +164,7 @@ def _attached(top: OracleContainer, machine: smach.StateMachine) -> Iterator[Non
 def _attach(machine: OracleContainer) -> None:
     try:
         take_parameters(machine)
-        if not _attachments().has(machine):
+        if not _attachments().shows(machine):
             outside_main_thread(functools.partial(_attachments().attach, machine))
     except rospy.ROSInterruptException as err:
         # as a bare machine, it runs and finds the shutdown itself
