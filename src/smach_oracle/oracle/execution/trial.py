@@ -109,12 +109,13 @@ class ContainerRun(Execution):
             if self._is_executed:
                 self.end(self.outcome, error)
         finally:
-            with self._around:
-                if self._is_trial:
+            if self._is_trial:
+                with self._around:
                     _running.remove(node)
                     if not node.tree.is_parents():
                         self._end_trial(error)
-                elif self.outcome is None:
+            elif self.outcome is None:
+                with self._around:  # it may not have come as far as its trial
                     self.outcome = outcome_of_early_end(node)
                     if self._store is not None:
                         self._store.let_go()
