@@ -34,6 +34,22 @@ LAUNCH = (
 )
 BROKEN = '#!/bin/sh\necho it has no camera >&2\nexit 5\n'
 IDLE = '#!/bin/sh\nexec sleep 600\n'
+SEVERAL = """#!/usr/bin/env python3
+import threading
+import actionlib
+import rospy
+from smach_oracle.msg import SharedAutonomyAction, SharedAutonomyResult
+
+def work(goal):
+    goal.set_accepted()
+    seconds = 2.0 if goal.get_goal().query_id == 'long' else 0.5
+    result = SharedAutonomyResult(outcome='succeeded')
+    threading.Timer(seconds, goal.set_succeeded, [result]).start()
+
+rospy.init_node('several')
+actionlib.ActionServer('/several', SharedAutonomyAction, work, auto_start=False).start()
+rospy.spin()
+"""
 
 
 def blocks(language):
@@ -56,6 +72,7 @@ class InterfaceOnDemand(unittest.TestCase):
             'by_hand.launch': LAUNCH,
             'broken': BROKEN,
             'idle': IDLE,
+            'several': SEVERAL,
         }
         for name, text in files.items():
             with open(os.path.join(package, name), 'w') as file:
@@ -165,6 +182,28 @@ class InterfaceOnDemand(unittest.TestCase):
             self.offer(node='my_robot idle', start_limit_s=1.5),
             'no action server /by_hand within 1.5 s',
         )
+        self.assert_gone()
+
+    def test_two_questions_share_one_and_the_first_that_ends_does_not_stop_it(self):
+        offer = self.offer(node='my_robot several', action='/several')
+        answers = {}
+
+        def run(query_id):
+            answers[query_id] = self.client.run_interface(
+                offer, make_question(query_id), threading.Event(), lambda *what: None
+            )
+
+        threads = [threading.Thread(target=run, args=(each,)) for each in ('short', 'long')]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join(60.0)
+        self.assertEqual(
+            {query_id: answer.outcome for query_id, answer in answers.items()},
+            {'short': 'succeeded', 'long': 'succeeded'},
+        )
+        run('short again')  # while it is being stopped
+        self.assertEqual(answers['short again'].outcome, 'succeeded')
         self.assert_gone()
 
     def test_one_that_nobody_can_start_is_waited_for_only_so_long(self):

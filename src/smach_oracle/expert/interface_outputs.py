@@ -12,14 +12,14 @@ TOPIC = '/interface_output'  # behind the robot's name
 
 
 class InterfaceOutputs:
-    """Follows `<robot>/interface_output` of robots and holds the newest message of each."""
+    """Follows `<robot>/interface_output` of robots and holds the newest one for each question."""
 
     def __init__(self, query_id: str = '') -> None:
         """`query_id`: of the only question whose interface is followed. '' follows all."""
         self._query_id = query_id
         self._topics = RobotTopics(TOPIC, InterfaceOutput, self.taker, queue_size=5)
         self._lock = threading.Lock()
-        self._newest: 'OrderedDict[str, InterfaceOutput]' = OrderedDict()  # by robot
+        self._newest: 'OrderedDict[str, InterfaceOutput]' = OrderedDict()  # by question
 
     def follow(self, robots: Collection[str]) -> None:
         """Listen to these robots, too."""
@@ -28,24 +28,21 @@ class InterfaceOutputs:
     def newest(self, query_id: str) -> Optional[InterfaceOutput]:
         """Return the newest message about a question, or None where nothing was started for it."""
         with self._lock:
-            return next((each for each in self._newest.values() if each.query_id == query_id), None)
+            return self._newest.get(query_id)
 
     def stop(self) -> None:
         """Listen to no robot any longer."""
         self._topics.stop()
 
-    def taker(self, robot: str) -> Callable[[InterfaceOutput], None]:
+    def taker(self, _robot: str) -> Callable[[InterfaceOutput], None]:
         """Return the function that takes a robot's messages."""
+        return self._take
 
-        def take(message: InterfaceOutput) -> None:
-            if self._query_id in ('', message.query_id):
-                self._keep(robot, message)
-
-        return take
-
-    def _keep(self, robot: str, message: InterfaceOutput) -> None:
+    def _take(self, message: InterfaceOutput) -> None:
+        if self._query_id not in ('', message.query_id):
+            return
         with self._lock:
-            self._newest[robot] = message
-            self._newest.move_to_end(robot)
+            self._newest[message.query_id] = message
+            self._newest.move_to_end(message.query_id)
             while len(self._newest) > MOST_ROBOTS:
                 self._newest.popitem(last=False)

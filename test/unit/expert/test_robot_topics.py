@@ -71,3 +71,11 @@ def test_the_output_for_one_question_stays_while_the_robot_prints_for_another():
     take(InterfaceOutput(query_id='q1', lines=['hello']))
     take(InterfaceOutput(query_id='q2', lines=['other']))
     assert outputs.newest('q1').lines == ['hello'] and outputs.newest('q2') is None
+
+
+def test_a_robot_s_outputs_for_two_questions_stay_side_by_side():
+    outputs = InterfaceOutputs()
+    take = outputs.taker('/robot')
+    take(InterfaceOutput(query_id='q1', lines=['hello']))
+    take(InterfaceOutput(query_id='q2', lines=['other']))
+    assert outputs.newest('q1').lines == ['hello'] and outputs.newest('q2').lines == ['other']

@@ -141,16 +141,19 @@ class ExpertQueryClient(Expert):
             return self._result(offer, link, question, cancelled)
         finally:
             if started is not None:
-                started.publish_status(InterfaceOutput.STOPPED, 'it is being stopped')
-                started.stop()
+                started.leave(question.question_id)
 
     def _provide(
         self, offer: InterfaceOffer, link: GoalLink, query_id: str, cancelled: threading.Event
     ) -> Optional[StartedInterface]:
-        """Wait for the action server. Start it where it can be started and nobody else has."""
-        if (offer.start is None or _advertised(link)) and _wait_until_ready(
+        """Wait for the action server. Start it where it can be started and nobody else has.
+
+        One that was started here is shared.
+        """
+        there = (offer.start is None or _advertised(link)) and _wait_until_ready(
             link, self._server_wait_s, cancelled
-        ):
+        )
+        if there and (offer.start is None or not self._starter.runs(offer.name)):
             return None
         if offer.start is None or cancelled.is_set():
             raise InterfaceError(
@@ -173,8 +176,7 @@ class ExpertQueryClient(Expert):
                     link.name, offer.start.limit_s
                 )
             if why:
-                started.publish_status(InterfaceOutput.FAILED, why)
-                started.stop()
+                started.leave(query_id, why)
                 raise InterfaceError(why)
             cancelled.wait(POLL_S)
         started.publish_status(

@@ -11,7 +11,7 @@ import threading
 import time
 from collections import deque
 from pathlib import Path
-from typing import Callable, Deque, Dict, List, Optional
+from typing import Callable, Deque, Dict, List, Optional, Sequence
 
 import roslib.packages
 import rospkg
@@ -67,7 +67,10 @@ def command_of(start: InterfaceStart) -> List[str]:
 
 
 class StartedInterface:
-    """One interface's processes, from their start to their end."""
+    """One interface's processes, from their start to their end.
+
+    Several questions may use it. It ends when the last one has left it.
+    """
 
     def __init__(
         self, offer: InterfaceOffer, query_id: str, publish: Callable[[InterfaceOutput], None]
@@ -76,8 +79,8 @@ class StartedInterface:
 
         :raises InterfaceError: where it cannot be started.
         """
-        self._name = offer.name
-        self._query_id = query_id
+        self._offer = offer
+        self._query_ids = [query_id]  # that use it
         self._publish = publish
         self._lines: Deque[str] = deque(maxlen=MOST_LINES)
         self._lock = threading.Lock()
@@ -123,12 +126,37 @@ class StartedInterface:
         with self._lock:
             return ' / '.join([line for line in self._lines if line.strip()][-3:])
 
+    def share(self, offer: InterfaceOffer, query_id: str) -> bool:
+        """Have one more question use it. Return whether it can: it runs, and was started so."""
+        with self._lock:
+            if self._stopping or self.exit_code is not None or self._offer.start != offer.start:
+                return False
+            self._query_ids.append(query_id)
+        self._changed.set()
+        return True
+
+    def leave(self, query_id: str, why: str = '') -> None:
+        """Have a question use it no longer. Return at once, as `stop` does.
+
+        :param why: it failed for this question. '' if it did not.
+        """
+        with self._lock:
+            self._query_ids.remove(query_id)
+            unused = not self._query_ids
+            self._stopping = self._stopping or unused
+            status = InterfaceOutput.FAILED if why else InterfaceOutput.STOPPED
+            text = why or ('it is being stopped' if unused else 'it goes on, for another question')
+            self._send([query_id], status, text)
+        rospy.loginfo('Interface %s: %s', self._offer.name, text)
+        if unused:
+            self.stop()
+
     def publish_status(self, status: int, text: str) -> None:
-        """Publish its status."""
+        """Publish its status to all questions that use it."""
         with self._lock:
             self._status, self._text = status, text
-        rospy.loginfo('Interface %s: %s', self._name, text)
-        self._send()
+            self._send(self._query_ids, status, text)
+        rospy.loginfo('Interface %s: %s', self._offer.name, text)
 
     def stop(self) -> None:
         """Begin its end, and return at once.
@@ -161,19 +189,22 @@ class StartedInterface:
         while not self._stopping:
             self._changed.wait()
             self._changed.clear()
-            self._send()
+            with self._lock:
+                self._send(self._query_ids, self._status, self._text)
             time.sleep(_PUBLISH_PERIOD_S)
 
-    def _send(self) -> None:
-        with self._lock:
-            message = InterfaceOutput(
-                query_id=self._query_id,
-                interface=self._name,
-                status=self._status,
-                text=self._text,
-                lines=list(self._lines),
+    def _send(self, query_ids: Sequence[str], status: int, text: str) -> None:
+        """Publish under the lock: what is older comes first."""
+        for query_id in query_ids:
+            self._publish(
+                InterfaceOutput(
+                    query_id=query_id,
+                    interface=self._offer.name,
+                    status=status,
+                    text=text,
+                    lines=list(self._lines),
+                )
             )
-        self._publish(message)
 
 
 class InterfaceStarter:
@@ -182,23 +213,37 @@ class InterfaceStarter:
     def __init__(self) -> None:
         self._publisher = rospy.Publisher(OUTPUT_TOPIC, InterfaceOutput, latch=True, queue_size=5)
         self._last: Dict[str, StartedInterface] = {}
+        self._turns: Dict[str, threading.Lock] = {}  # by name: one start after another
         self._lock = threading.Lock()
         rospy.on_shutdown(lambda: start_thread(self.stop))  # often in a signal's handler
 
+    def runs(self, name: str) -> bool:
+        """Whether anything is left of what was started under a name."""
+        with self._lock:
+            last = self._last.get(name)
+        return last is not None and last.exit_code is None
+
     def start(self, offer: InterfaceOffer, query_id: str) -> StartedInterface:
-        """Start it, once what was started under its name before has ended.
+        """Share what runs under its name, else start it once what was before has ended.
 
         :raises InterfaceError: where it cannot be started.
         """
-        before = self._last.get(offer.name)
-        if before is not None:
-            before.stop()
-            if not before.ended(END_LIMIT_S):
+        with self._lock:
+            turn = self._turns.setdefault(offer.name, threading.Lock())
+        with turn:
+            with self._lock:
+                before = self._last.get(offer.name)
+            if before is not None and before.share(offer, query_id):
+                return before
+            if before is not None and not before.ended(END_LIMIT_S):
                 raise InterfaceError(
                     'what was started for an earlier question has not ended within {:g} s'.format(
                         END_LIMIT_S
                     )
                 )
+            return self._start(offer, query_id)
+
+    def _start(self, offer: InterfaceOffer, query_id: str) -> StartedInterface:
         try:
             started = StartedInterface(offer, query_id, self._publish)
         except InterfaceError as err:
