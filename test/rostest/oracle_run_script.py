@@ -33,6 +33,43 @@ for name in sys.argv[1:]:
     sys.stdin.readline()
 """
 TWO_TRIALS = ('one', 'two')
+LATE_NODE = """
+import threading, rospy, smach
+from std_msgs.msg import String
+
+def machine(label, work):
+    sm = smach.StateMachine(outcomes=['succeeded'])
+    with sm:
+        smach.StateMachine.add(label, smach.CBState(work, outcomes=['succeeded']))
+    return sm
+
+def boot(userdata):
+    return 'succeeded'
+
+def wait(userdata):
+    runs.set()
+    is_over.wait(60)
+    return 'succeeded'
+
+def task(userdata):
+    rospy.sleep(1.0)  # in which a recorder finds the topics
+    return 'succeeded'
+
+runs, is_over = threading.Event(), threading.Event()
+boot, beside, task = machine('BOOT', boot), machine('BESIDE', wait), machine('TASK', task)
+boot.execute()
+thread = threading.Thread(target=beside.execute)
+thread.start()
+runs.wait(60)
+rospy.init_node('task')
+talk = rospy.Publisher('/talk', String, latch=True, queue_size=1)
+talk.publish('hello')
+task.execute()
+is_over.set()
+thread.join()
+for each in (boot, beside):
+    each.execute()
+"""
 
 
 class MoveServer:
@@ -234,6 +271,42 @@ class OracleRunTest(unittest.TestCase):
             self.assertTrue(seen['/task/oracle/rates'])
             self.assertIn('/move/goal', topics)
             self.assertIn('/task/smach/container_status', topics)
+
+    def test_topics_are_recorded_from_when_the_script_is_a_node(self) -> None:
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        task = oracle_run(
+            self, '--record', folder.name, '--record-topic', '/talk', script(self, LATE_NODE)
+        )
+        self.assertEqual(task.wait(), 0, task.output())
+        seen = []
+        for path in sorted(glob.glob(os.path.join(folder.name, '*.bag'))):
+            with rosbag.Bag(path) as bag:
+                topics = bag.get_type_and_topic_info()[1]
+                (events,) = [topic for topic in topics if topic.endswith('oracle/events')]
+                numbers = [event.seq for _, event, _ in bag.read_messages(events)]
+                (state,) = {event.state for _, event, _ in bag.read_messages(events) if event.state}
+            self.assertEqual(numbers, list(range(len(numbers))))
+            seen.append((state, events))
+            if events == '/task/oracle/events':
+                for topic in (
+                    '/talk',
+                    '/task/oracle/rates',
+                    '/task/record/status',
+                    '/task/smach/container_structure',
+                ):
+                    self.assertIn(topic, topics)
+        self.assertEqual(
+            seen,
+            [
+                ('BOOT', '/oracle/events'),
+                ('BESIDE', '/oracle/events'),
+                ('TASK', '/task/oracle/events'),
+                ('BOOT', '/task/oracle/events'),
+                ('BESIDE', '/task/oracle/events'),
+            ],
+        )
+        self.assertEqual(len(os.listdir(folder.name)), len(seen), 'none is left open')
 
 
 if __name__ == '__main__':

@@ -113,6 +113,7 @@ class Attachments:
         # bound once: a machine listens again where it is given another one
         self._listen_to_health = functools.partial(listen_to_health, HealthTopics())
         self._recorder: Optional[TrialRecorder] = None
+        self._without_node: Optional[TrialRecorder] = None  # of trials from before the node
         self._recorder_wanted = True
         self._wants_introspection = True
         self._replays: Optional[FailureReplays] = None
@@ -125,7 +126,8 @@ class Attachments:
 
     def _let_go(self) -> None:
         """Leave a child without what its parent has, and the node to its parent."""
-        self.options, self._recorder, self._recorder_wanted = RecordingOptions(), None, True
+        self.options, self._recorder_wanted = RecordingOptions(), True
+        self._recorder = self._without_node = None
         self.refusing, self.guard = nullcontext, None
         self._lock = threading.RLock()
         for server in self._introspection.values():
@@ -246,9 +248,9 @@ class Attachments:
 
     def close(self, timeout_s: float) -> None:
         """Close the bags, also of trials that have not ended. Any thread, any number of times."""
-        recorder = self._recorder
-        if recorder is not None:
-            recorder.close(timeout_s)
+        for recorder in (self._recorder, self._without_node):
+            if recorder is not None:
+                recorder.close(timeout_s)
 
     def _start_node(self) -> None:
         if self._node_started:
@@ -337,8 +339,11 @@ class Attachments:
         return self._expert
 
     def _plan_recording(self, node: bool) -> Optional[_RecordingPlan]:
-        """Folder and topics for a recorder, or None where one is there or none is wanted."""
-        if self._recorder is not None or not self._recorder_wanted:
+        """Folder and topics for a recorder, or None where one is there or none is wanted.
+
+        One that was made without a node knows no topics. Another takes its place once there is one.
+        """
+        if not self._recorder_wanted or (self._recorder is not None and not node):
             return None
         folder = self.options.record or (private_text('record') if node else '')
         plan = self._plan_for(folder, node) if folder else None
@@ -366,10 +371,13 @@ class Attachments:
 
     def _record(self, machine: OracleContainer, plan: Optional[_RecordingPlan]) -> None:
         if plan is not None:
-            self._recorder = TrialRecorder(
-                plan.folder, plan.topics, types=plan.types, keep=plan.keep
+            self._without_node, self._recorder = (
+                self._recorder,
+                TrialRecorder(plan.folder, plan.topics, types=plan.types, keep=plan.keep),
             )
         if self._recorder is not None:
+            if self._without_node is not None:  # it goes on with trials that run
+                self._without_node.detach(oracle_of(machine).events)
             if self._diagnostics is not None:
                 self._diagnostics.listen_to_recorder()
             self._recorder.attach(

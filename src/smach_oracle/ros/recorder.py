@@ -15,7 +15,7 @@ import rospy
 
 from smach_common.foreign import error_text, repr_of
 from smach_oracle.forking import in_child
-from smach_oracle.oracle.identity import WeakIdentityMap
+from smach_oracle.oracle.identity import WeakIdentityMap, remove_identical
 from smach_oracle.oracle.records.events import Event, EventKind, EventSource, OwnObserver
 from smach_oracle.oracle.settings.paths import path_of
 
@@ -114,7 +114,7 @@ class TrialRecorder(OwnObserver):
             LATE_S if listens else 0.0,
         )
         self._bags.recover()
-        self._attached: WeakIdentityMap[EventSource, bool] = WeakIdentityMap()
+        self._attached: WeakIdentityMap[EventSource, _MachineObserver] = WeakIdentityMap()
         self._hung = False
         self._closed = False
         self._is_parents = False
@@ -138,16 +138,23 @@ class TrialRecorder(OwnObserver):
         source = machine if isinstance(machine, EventSource) else machine.events
         if source in self._attached:
             return
-        self._attached[source] = True
-        source.observers.append(
-            _MachineObserver(
-                self._observe,
-                self._put_snapshot,
-                self._put_end,
-                self._warn_once,
-                {resolve(topic): take for topic, take in (snapshots or {}).items()},
-            )
+        observer = _MachineObserver(
+            self._observe,
+            self._put_snapshot,
+            self._put_end,
+            self._warn_once,
+            {resolve(topic): take for topic, take in (snapshots or {}).items()},
         )
+        self._attached[source] = observer
+        source.observers.append(observer)
+
+    def detach(self, source: EventSource) -> None:
+        """Record no more trials of a machine. It is between two trials."""
+        observer = self._attached.get(source)
+        if observer is not None:
+            self._attached.forget(source)
+            remove_identical(source.observers, observer)
+            observer.end()
 
     def __call__(self, event: Event) -> None:
         """Record one event. The observer that a machine without snapshots may be given directly."""
@@ -314,9 +321,15 @@ class _MachineObserver(OwnObserver):
         self._snapshots = snapshots
         self._trial_id: Optional[str] = None
 
+    def end(self) -> None:
+        """Close the bag of a trial that ended without saying so."""
+        if self._trial_id is not None:
+            self._put_end(self._trial_id)
+            self._trial_id = None
+
     def __call__(self, event: Event) -> None:
-        if self._trial_id not in (None, event.trial_id):
-            self._put_end(self._trial_id or '')  # the earlier trial ended without saying so
+        if event.trial_id != self._trial_id:
+            self.end()
         self._trial_id = None if event.kind == EventKind.TRIAL_END else event.trial_id
         if event.kind == EventKind.TRIAL_END:
             self._take_snapshots(event)

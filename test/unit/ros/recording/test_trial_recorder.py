@@ -55,6 +55,20 @@ def test_each_trial_has_a_bag_named_by_its_time_and_its_id(recorder, source, tmp
     assert active(tmp_path) == []
 
 
+def test_a_machine_that_is_detached_is_recorded_no_more(recorder, source, tmp_path):
+    for trial_id in ('told its end', 'did not'):
+        trial(source, trial_id, end=trial_id != 'did not')
+    recorder.detach(source)
+    recorder.detach(source)
+    assert wait_for(lambda: len(finished(tmp_path)) == 2), 'no bag stays open'
+    trial(source, 'later')
+    assert source.observers == []
+    recorder.attach(source)
+    trial(source, 'again')
+    assert recorder.close(10.0)
+    assert [path[-9:-4] for path in finished(tmp_path)[2:]] == ['again'] and not active(tmp_path)
+
+
 def test_a_bag_holds_every_event_as_it_was_told(recorder, source, tmp_path):
     source.begin_trial('t')
     source.emit(EventKind.TRIAL_START, 'TOP', data={'initial': ['A'], 'recovers': False})
