@@ -14,7 +14,7 @@ from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError, SkippedBag
 from .compare_command.inputs import instead_of_bags
-from .counting.trial_summary import summarise
+from .counting.trials_of_bags import trials_of
 from .reading import read_bags, report_error, report_skipped
 
 SAME, NOT_THE_SAME = 0, 1  # exit codes
@@ -28,7 +28,7 @@ TrialKey = Tuple[str, str, Tuple[Tuple[str, Any], ...], int]  # experiment, vari
 class TrialSteps(NamedTuple):
     """The steps of one trial, and where it was recorded."""
 
-    bag: str
+    bag: str  # the first of its bags
     steps: Tuple[TrialStep, ...]
 
 
@@ -60,17 +60,16 @@ def load_trial_steps(place: str, skipped: List[SkippedBag]) -> Dict[TrialKey, Tr
     :raises BagError: where there are none, or no folder.
     """
     found: Dict[TrialKey, TrialSteps] = {}
-    for path, content in read_bags([place], skipped):
-        for trial_id, cause in content.causes.items():
-            events = [event for event in content.events if event.trial_id == trial_id]
-            summary = summarise(events, (path,))
+    for trial in trials_of(dict(read_bags([place], skipped))):
+        if trial.cause is not None:
+            summary = trial.summary(None)
             key = (
                 summary.experiment,
                 'without' if summary.recovers is False else 'with',
                 summary.settings,
-                cause.seed,
+                trial.cause.seed,
             )
-            found[key] = TrialSteps(path, steps_of(events))
+            found[key] = TrialSteps(trial.bags[0], steps_of(trial.events))
     return found
 
 

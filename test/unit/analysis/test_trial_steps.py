@@ -43,6 +43,19 @@ def test_the_same_trials_at_other_times_are_the_same(tmp_path, capsys):
     assert '6 trials in both, 6 of them the same' in capsys.readouterr().out
 
 
+def test_a_trial_that_went_on_in_another_bag_is_compared_whole(tmp_path, capsys):
+    folders, events = [record(tmp_path / 'a', [3]), str(tmp_path / 'b')], []
+    FakeMachine(events.append).run(3, 'trial-3-in_two')
+    for part in (events[:5], events[5:]):
+        recorder = TrialRecorder(folders[1], warn=pytest.fail)
+        for event in part:
+            recorder(event)
+        assert recorder.close(20.0)
+    assert len(list(Path(folders[1]).glob('*.bag'))) == 2
+    assert trial_steps.main(folders) == trial_steps.SAME
+    assert '1 trials in both, 1 of them the same' in capsys.readouterr().out
+
+
 def test_a_trial_that_went_another_way_is_named_with_its_first_difference(tmp_path, capsys):
     failing = next(
         seed for seed in range(100) if FakeMachine(lambda event: None, False).run(seed) == 'aborted'
