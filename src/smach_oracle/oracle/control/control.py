@@ -292,9 +292,12 @@ class Control:
             )
 
     def obey(self, orders: 'StandingOrders') -> None:
-        """Be asked this, and nothing else, beyond the present trial."""
+        """Be asked this, too, beyond the present trial."""
         with self._changed:
-            self.paused, self.paused_by, self._breakpoints, self._levels = orders
+            if orders.paused:
+                self.paused, self.paused_by = True, orders.paused_by
+            self._breakpoints.update(orders.breakpoints)
+            self._levels.update(orders.levels)
             self._note_change()
 
     def pause(self, by: str = '') -> None:

@@ -55,19 +55,30 @@ _CHANGES = frozenset(
 
 MOST_PATHS = 100  # a script may give each trial a machine of another name
 
-# what a command asks of machines that are not there yet
+# what a command asks of a machine that does not answer, such as one to come
 Asks = Callable[[Control], object]
 
 
 class _CommandedPath(NamedTuple):
-    """A path: the machines that run there, with the last one that has begun, and what is asked."""
+    """The machines of a path in the order in which they have begun, and what the last is asked."""
 
     machines: Tuple['weakref.ref[OracleContainer]', ...]
-    control: Control  # of the last one
+    control: Control
 
     def alive(self) -> List[OracleContainer]:
         """Return the machines that are still there."""
         return [machine for machine in (each() for each in self.machines) if machine is not None]
+
+    def answering(self) -> List[OracleContainer]:
+        """Return those that answer a command: all that run, and the last one."""
+        alive = self.alive()
+        return [each for each in alive[:-1] if each.is_running()] + alive[-1:]
+
+    def silent(self) -> List[Control]:
+        """Return what is asked of the others, which do as they are asked without a word."""
+        alive, answering = self.alive(), self.answering()
+        others = [each for each in alive if not any(each is other for other in answering)]
+        return [OperatorHand(each).control for each in others] if alive else [self.control]
 
 
 class HandServer(OwnObserver):
@@ -95,29 +106,24 @@ class HandServer(OwnObserver):
         rospy.Service(NAMESPACE + name, kind, handle)
 
     def watch(self, machine: OracleContainer) -> None:
-        """Offer the hand on a top-level machine."""
-        oracle_of(machine).events.observers.append(self._observer)
+        """Offer the hand on a top-level machine. It obeys what its path, or all, were asked."""
+        oracle = oracle_of(machine)
+        oracle.events.observers.append(self._observer)
         self._viewers.listen_for(machine)
+        with self._lock:
+            known = self._known.get(oracle.path)
+            orders = (self._of_all if known is None else known.control).orders()
+        OperatorHand(machine).control.obey(orders)
         self.begins(machine)
 
     def begins(self, machine: OracleContainer) -> None:
-        """Have the commands for the path of a machine reach it, as its next trial begins.
-
-        It obeys what was asked of the machine that was there before, or of all machines.
-        """
+        """Have a machine answer for its path from now on, as its next trial begins."""
         path, control = oracle_of(machine).path, OperatorHand(machine).control
         with self._lock:
-            before = self._known.pop(path, None)
-            asked = self._of_all if before is None else before.control
-            running = [] if before is None else [m for m in before.alive() if m.is_running()]
             self._let_go(machine)  # it may have had another name
-            self._known[path] = _CommandedPath(
-                tuple(weakref.ref(each) for each in running if each is not machine)
-                + (weakref.ref(machine),),
-                control,
-            )
-            if asked is not control:
-                control.obey(asked.orders())
+            known = self._known.pop(path, _CommandedPath((), control))
+            others = [weakref.ref(each) for each in known.alive()]
+            self._known[path] = _CommandedPath((*others, weakref.ref(machine)), control)
             while len(self._known) > MOST_PATHS:
                 self._known.popitem(last=False)
         self._status.changed()
@@ -144,7 +150,7 @@ class HandServer(OwnObserver):
         """The hands, by the paths of their machines."""
         with self._lock:
             known = sorted(self._known.items())
-        return [(path, OperatorHand(machine)) for path, at in known for machine in at.alive()]
+        return [(path, OperatorHand(machine)) for path, at in known for machine in at.answering()]
 
     # -- in threads of rospy's
 
@@ -158,7 +164,7 @@ class HandServer(OwnObserver):
 
             asks = _asks(name, by)
             if asks is not None and not path and not self._hands():
-                self._ask_those_to_come(asks)
+                self._ask_silently(path, asks)
                 return CommandMachineResponse(True, 'no machine is there; the next one obeys')
             return CommandMachineResponse(*self._each(path, command, asks))
 
@@ -202,7 +208,7 @@ class HandServer(OwnObserver):
 
         Return whether one of them has obeyed, and what they say.
 
-        :param asks: of machines to come, where every machine of the node is meant.
+        :param asks: the same of a machine that does not answer, or is to come.
         :param only: one machine must be meant.
         """
         hands = self._hands()
@@ -212,20 +218,22 @@ class HandServer(OwnObserver):
                 path, ', '.join(each for each, _ in hands) or 'none; the first has yet to run'
             )
         told, refused = command_all(meant, command)
-        if told and asks is not None and not path.strip('/'):
-            self._ask_those_to_come(asks)
+        if told and asks is not None:
+            self._ask_silently(path, asks)
         self._status.changed()
         return bool(told), '; '.join(told or refused)
 
-    def _ask_those_to_come(self, asks: Asks) -> None:
+    def _ask_silently(self, path: str, asks: Asks) -> None:
+        """Ask the machines that do not answer, and where all are meant those that are to come."""
         with self._lock:
-            absent = [known.control for known in self._known.values() if not known.alive()]
-        for control in [self._of_all, *absent]:
+            meant = [known for each, known in self._known.items() if _is_in(path, each)]
+        of_all = [] if path.strip('/') else [self._of_all]
+        for control in of_all + [control for known in meant for control in known.silent()]:
             asks(control)
 
 
 def _asks(name: str, by: str) -> Optional[Asks]:
-    """Return what a command asks of machines that are not there yet."""
+    """Return what a command asks of a machine that does not answer. None: nothing."""
     if name in ('pause', 'step'):
         return lambda control: control.pause(by)
     return None if name == 'confirm' else lambda control: control.resume()

@@ -198,15 +198,41 @@ def test_between_two_machines_the_node_is_held(services):
 def test_a_command_reaches_the_machine_that_has_begun_last_and_all_that_run(services, monkeypatch):
     server, one, two = HandServer(), machine('task'), machine('task')
     pause, resume = services['~oracle/pause'], services['~oracle/resume']
-    for each in (one, two, one):  # one, made first, has begun once more
-        server.watch(each)
-    pause(CommandMachineRequest())
-    assert (is_paused(one), is_paused(two)) == (True, False)
-    resume(CommandMachineRequest())
-    monkeypatch.setattr(type(one), 'is_running', lambda self: self is one)
+    one_hand, two_hand = OperatorHand(one), OperatorHand(two)
+    server.watch(one)
     server.watch(two)
-    pause(CommandMachineRequest())
+    server.begins(one)  # once more
+    assert [hand.status().running for _, hand in server._hands()] == [False]
+    monkeypatch.setattr(type(one), 'is_running', lambda self: self is one)
+    assert pause(CommandMachineRequest()).message.startswith('task is paused')
+    assert resume(CommandMachineRequest()).message.startswith('task goes on')
+    server.begins(two)
+    assert len(server._hands()) == 2
+    pause(CommandMachineRequest(path='task'))
+    assert one_hand.status().paused and two_hand.status().paused
+
+
+def test_a_machine_that_waits_for_its_turn_obeys_without_a_word(services):
+    server, one, two = HandServer(), machine('task'), machine('task')
+    server.watch(one)
+    server.watch(two)
+    assert services['~oracle/pause'](CommandMachineRequest()).message.count('task') == 1
     assert is_paused(one) and is_paused(two)
+    services['~oracle/preempt'](CommandMachineRequest())
+    assert not is_paused(one) and not is_paused(two)
+
+
+def test_what_a_program_asks_before_its_machine_runs_stays(services):
+    server, one, two = HandServer(), machine('task'), machine('task')
+    server.watch(one)
+    OperatorHand(two).set_breakpoint('A')
+    OperatorHand(two).pause(by='the program')
+    server.watch(two)
+    server.begins(one)
+    server.begins(two)
+    status = OperatorHand(two).status()
+    assert (status.paused_by, status.breakpoints) == ('the program', ('A',))
+    assert not is_paused(one)
 
 
 def test_a_machine_that_was_named_anew_goes_by_that_name_alone(services):
