@@ -52,6 +52,12 @@ def test_the_defaults_are_those_of_the_design():
     assert Settings.from_dict(None) == settings
 
 
+@pytest.mark.parametrize('action', ['hand', '/hand/', '/1robot//hand', '~hand', '~/hand', 'a/b'])
+def test_an_action_may_have_each_name_that_ros_resolves(action):
+    settings = Settings.from_dict({'interfaces': {'hand': {'action': action}}})
+    assert settings.interfaces[0][0].action == action
+
+
 def test_the_file_that_shows_the_settings_has_their_defaults():
     lines = (ROOT / 'launch/oracle.yaml').read_text(encoding='utf-8').splitlines()
     keys = '\n'.join(line[2:] for line in lines if re.match('# +([a-z_]+:|#)', line))

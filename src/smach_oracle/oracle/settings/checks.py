@@ -27,6 +27,7 @@ from typing import (
     Mapping,
     NamedTuple,
     Optional,
+    Pattern,
     Sequence,
     Tuple,
     TypeVar,
@@ -123,11 +124,13 @@ def file(key: str, value: object) -> str:
 
 # of ROS: a name from the root, of the node's own, or relative
 _GRAPH_NAME = re.compile(r'(~/?|/)?[A-Za-z]\w*(/[A-Za-z0-9_]+)*', re.ASCII)
+# one that rospy resolves, too: it takes slashes in excess away
+ROSPY_NAME = re.compile(r'(~/?|/+|(?=[A-Za-z]))\w+(/+\w+)*/?', re.ASCII)
 
 
-def graph_name(allowed: str) -> Check[str]:
+def graph_name(allowed: str, form: Pattern[str] = _GRAPH_NAME) -> Check[str]:
     """Check for a name of ROS. Its SettingsError says `allowed`."""
-    check = _text_that(allowed, lambda word: _GRAPH_NAME.fullmatch(word) is not None)
+    check = _text_that(allowed, lambda word: form.fullmatch(word) is not None)
     return lambda key, value: check(key, label(key, value))
 
 

@@ -16,7 +16,7 @@ _LAUNCH = re.compile(r'({0})/({0}\.launch)'.format(_NAME))
 _NODE = re.compile(r'({0}) +({0})'.format(_NAME))
 _ARGUMENT = re.compile(r'[A-Za-z_][A-Za-z0-9_]*')
 START_LIMIT_S = 60.0
-_ACTION = values.graph_name('the name of an action, such as /hand')
+_ACTION = values.graph_name('the name of an action, such as /hand', values.ROSPY_NAME)
 _LIMIT = values.number(0.1, 3600.0, 'seconds from 0.1 to 3600')
 
 
