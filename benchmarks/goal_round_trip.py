@@ -76,10 +76,11 @@ def measure(goals):
 
     rospy.init_node('round_trip_client', disable_signals=True, log_level=rospy.WARN)
     answered = threading.Event()
-    back = rospy.Subscriber(BACK, Empty, lambda _: answered.set(), tcp_nodelay=True)
+    rospy.Subscriber(BACK, Empty, lambda _: answered.set(), tcp_nodelay=True)
     go = rospy.Publisher(GO, Empty, queue_size=1, tcp_nodelay=True)
-    while not (go.get_num_connections() and back.get_num_connections()):
-        time.sleep(0.05)
+    until_s = time.monotonic() + 60.0
+    while not answered.wait(0.1) and time.monotonic() < until_s:
+        go.publish(Empty())  # what comes before the connections is lost
     state = SimpleActionState(WORK, TestAction, goal=TestGoal(100))
     taken, messages = [], []
     for number in range(goals + WARM):
