@@ -12,13 +12,12 @@ number is the same. With --check the exit status is 1 above a limit.
 """
 
 import argparse
-import itertools
 import sys
-import threading
 import time
-from typing import Any, Callable, List, NamedTuple, Tuple
+from typing import Callable, List, NamedTuple, Tuple
 
-from oracle_overhead import Fixed, silence
+from oracle_overhead import Fixed
+from quiet import counted_instructions, silence
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -143,23 +142,9 @@ def instructions(row: Row) -> List[float]:
 def executed_by(machine: smach.StateMachine) -> int:
     """Instructions of Python that an execution takes in all of its threads."""
     machine.execute()  # what is done once is done
-    numbers = itertools.count()
-
-    def trace(frame: Any, event: str, _arg: object) -> Any:
-        if event == 'opcode':
-            next(numbers)
-        else:
-            frame.f_trace_opcodes, frame.f_trace_lines = True, False
-        return trace
-
-    threading.settrace(trace)
-    sys.settrace(trace)
-    try:
+    with counted_instructions() as executed:
         machine.execute()
-    finally:
-        sys.settrace(None)
-        threading.settrace(None)  # type: ignore[arg-type]  # which is how it is ended
-    return next(numbers)
+    return executed()
 
 
 def main() -> int:

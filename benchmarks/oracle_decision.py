@@ -14,13 +14,12 @@ limit.
 import argparse
 import itertools
 import sys
-import threading
 import time
 from typing import Any, Callable, List, Tuple
 
 from checkpoint import learn
 from oracle_overhead import bare_step_s
-from quiet import silence
+from quiet import counted_instructions, silence
 
 import smach
 from smach_oracle.oracle import OracleContainer
@@ -118,22 +117,8 @@ def machine_after(
 
 def instructions_of(policy: str) -> int:
     """Instructions of Python that a decision executes, in all of its threads."""
-    executed = [0]
-
-    def trace(frame: Any, event: str, _arg: object) -> Any:
-        if event == 'opcode':
-            executed[0] += 1
-        else:
-            frame.f_trace_opcodes, frame.f_trace_lines = True, False
-        return trace
-
-    threading.settrace(trace)
-    sys.settrace(trace)
-    try:
-        return int(min(machine_after(10, policy, lambda: float(executed[0]), COUNTED)[1]))
-    finally:
-        sys.settrace(None)
-        threading.settrace(None)  # type: ignore[arg-type]  # which is how it is ended
+    with counted_instructions() as executed:
+        return int(min(machine_after(10, policy, executed, COUNTED)[1]))
 
 
 def _limits(policy: str) -> Tuple[float, int]:
