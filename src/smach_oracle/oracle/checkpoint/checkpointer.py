@@ -174,7 +174,7 @@ class Checkpointer:
         if event.kind is node.site.begins_by:
             self._entered.setdefault(_begins_line(node), []).append(node)
         if event.kind is EventKind.JUMP:
-            pending += self._streaks(event, node)
+            pending += self._facts_of_way(event, node)
         if event.kind is EventKind.CONTAINER_END:
             pending += self._collected(node, all_keys=True)
             pending += self._around(node)
@@ -329,15 +329,16 @@ class Checkpointer:
             if outcome is not None:
                 yield fact_of(node.key, AT, [outcome, ENDED])
 
-    def _streaks(self, jump: Event, node: TreeNode) -> Iterator[Fact]:
-        """Yield what is new of the streaks that a jump adds to, or ends.
+    def _facts_of_way(self, jump: Event, node: TreeNode) -> Iterator[Fact]:
+        """Yield what a jump has changed of the failed state, and of the streaks around it.
 
-        They are those around the failed state, whose container the machine may have left.
+        The machine may have left its container since the recovery was counted.
         """
         data = cast('Mapping[str, object]', jump.data)  # each jump has some
         path, _, label = str(data.get(JUMPED_FROM, '')).rpartition('/')
         failed = self._known_node(path, label) or node
-        for each in (failed, *failed.around()):
+        yield from self._facts_of(failed).changed([label])
+        for each in failed.around():
             yield from self._facts_of(each).streaks()
 
     def _not_begun_below(self, path: str) -> Iterator[Fact]:

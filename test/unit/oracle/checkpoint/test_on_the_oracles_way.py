@@ -127,3 +127,42 @@ def test_a_recovery_counts_once_where_it_was_killed_before_its_jump(tmp_path):
 
     assert in_a_process(lambda: run(lambda: os.kill(os.getpid(), signal.SIGKILL))) is None
     assert in_a_process(lambda: run(lambda: None)) == ['succeeded', 1, 1]
+
+
+@pytest.mark.parametrize(
+    'settings',
+    [
+        {'policy': {'name': 'step_back', 'times': 1}, 'tree': {'step_back_across': True}},
+        {
+            'policy': 'always_ask',
+            'max_recoveries': 1,
+            'expert': {'on_no_answer': {'goto': 'FIND'}},
+        },
+        {'policy': {'name': 'restart', 'times': 9}, 'max_recoveries': 1},
+    ],
+    ids=['step_back', 'goto', 'restart'],
+)
+def test_a_recovery_that_has_left_its_container_counts_after_a_crash(tmp_path, settings):
+    def build(diary, points):
+        pick = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+        with pick:
+            smach.StateMachine.add('GRASP', Noted('GRASP', diary, points, failures=9), ENDS)
+        machine = smach.StateMachine(['succeeded', 'aborted'])
+        machine.userdata.done = []
+        with machine:
+            smach.StateMachine.add('FIND', Noted('FIND', diary, points), {'succeeded': 'PICK'})
+            smach.StateMachine.add('PICK', pick, ENDS)
+        return machine
+
+    whole = KilledMachine(make(tmp_path / 'whole'), build, **settings).run()
+    assert whole['outcome'] == 'aborted'
+    jumps = [seq for kind, seq, _ in whole['events'] if kind == 'JUMP']
+    assert len(jumps) == 1
+
+    killed = KilledMachine(make(tmp_path / 'killed'), build, **settings)
+    starts = [event[1] for event in whole['events'] if event[0] == 'STATE_START']
+    # FIND, PICK and GRASP have run, with two points in each state, and FIND has begun again
+    assert killed.run(kill_at=4 + starts[3] + 2) is None
+    assert killed.diary.count('begins') == {'FIND': 2, 'GRASP': 1}
+    assert killed.run(on_resume='state:FIND')['outcome'] == 'aborted'
+    assert killed.diary.count('begins') == {'FIND': 3, 'GRASP': 2}
