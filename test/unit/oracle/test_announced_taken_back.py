@@ -150,3 +150,23 @@ def test_a_failure_that_keeps_coming_is_continuous_after_that_of_another_state()
     )
     assert machine.run() == 'done'
     assert [event.continuous for event in machine.of(EventKind.DECISION)] == [False, False, True]
+
+
+def test_a_state_reports_a_failure_also_where_its_own_states_went_on_without_the_oracle():
+    within = made(
+        [
+            ('TALK', Scripted('failed', 'failed', outcomes=BAD), {'ok': 'done', 'failed': 'SIGN'}),
+            ('SIGN', Scripted(outcomes=('ok',)), {'ok': 'done'}),
+        ]
+    )
+    within.otherwise = 'done'  # as that of a Scripted: what REPORT ends with
+    states = {'TALK': {'author_recoveries': 'override', 'max_recoveries': 0}}
+    machine = reporting(
+        Scripted('failed', outcomes=BAD),
+        within,
+        settings={'states': states, 'policy': 'escalating'},
+    )
+    assert machine.run() == 'done'
+    (given_up,) = machine.of(EventKind.GIVE_UP)
+    assert (given_up.state, given_up.target) == ('TALK', 'SIGN')
+    assert machine.visits() == ['LOOK', 'WORK', 'REPORT', 'TALK', 'SIGN', 'WORK']

@@ -87,6 +87,12 @@ def test_settings_have_the_same_digest_if_they_are_the_same():
     assert digest(given) == digest(json.loads(json.dumps(given)))
 
 
+def test_the_order_in_which_states_are_set_does_not_count():
+    given = {'PICK': {'on_retry': 'never'}, 'LOOK': {'autonomy': 'announce'}}
+    turned = dict(reversed(list(given.items())))
+    assert digest({'states': given}) == digest({'states': turned})
+
+
 @pytest.mark.parametrize(
     'other',
     [

@@ -235,6 +235,7 @@ def test_in_a_child_process_a_machine_is_what_its_author_wrote(log):
     OracleContainer.wrap(machine, name='task', expert=asked)
 
     def in_child():
+        assert oracle_of(machine).is_parents, 'it is asked before it runs'
         outcomes = machine.execute(), machine.execute(), built.execute()
         oracle = oracle_of(built)
         kinds = [type(each) is smach.StateMachine for each in (machine, inner)]
@@ -248,6 +249,7 @@ def test_in_a_child_process_a_machine_is_what_its_author_wrote(log):
         without.format('task'),
         without.format('built'),
     ]
+    assert not oracle_of(machine).is_parents
     assert machine.execute() == 'done' and oracle_of(machine).recovers
     assert asked.questions == []
 

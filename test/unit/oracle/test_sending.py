@@ -101,6 +101,28 @@ def test_a_blocked_state_is_refused(of_b) -> None:
         gate.opened.set()
 
 
+def test_a_state_that_is_blocked_once_the_jump_is_due_is_not_entered() -> None:
+    gate = Gate(heeds=False)
+    held = Held(
+        chain_of(Scripted(gate), Scripted()),
+        settings={
+            'states': {'A': {'time_limit_s': 0.3, 'grace_period_s': 0.05}},
+            'max_recoveries': 0,
+        },
+        expert=FakeExpert(goto('B')),
+    )
+    with held.begin():
+        assert gate.entered.wait(20)
+        assert held.hand.go_to('', 'A') == 'SM_ROOT goes to A once A has ended'
+        assert held.end() == 'done'
+        gate.opened.set()
+    assert not held.of(EventKind.SENT)
+    told = [event.text for event in held.of(EventKind.WARNING)]
+    assert any(
+        each.startswith('is not sent to A: A cannot be entered now: still runs') for each in told
+    ), told
+
+
 def test_missing_keys_are_told_before() -> None:
     gate = Gate()
     machine = chain_of(Scripted(gate), Scripted(), Scripted(input_keys=['cup']))

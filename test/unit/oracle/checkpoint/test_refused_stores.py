@@ -1,5 +1,6 @@
 """A store that cannot be used: what a program that wraps its machine itself gets."""
 
+import contextlib
 import os
 
 import pytest
@@ -24,11 +25,18 @@ class Moving(smach.State):
         return 'succeeded'
 
 
-def wrapped(store, moved, **settings):
+class Interrupted(list):
+    """In place of what has moved: the state is interrupted as it moves."""
+
+    def append(self, item):
+        raise KeyboardInterrupt
+
+
+def wrapped(store, moved, name='TOP', **settings):
     machine = smach.StateMachine(['succeeded'])
     with machine:
         smach.StateMachine.add('MOVE', Moving(moved), {'succeeded': 'succeeded'})
-    return OracleContainer.wrap(machine, name='TOP', settings=dict(settings, checkpoint=str(store)))
+    return OracleContainer.wrap(machine, name=name, settings=dict(settings, checkpoint=str(store)))
 
 
 def no_folder(path):
@@ -74,6 +82,21 @@ def test_after_a_wrong_setting_the_machine_is_let_go(tmp_path):
     with pytest.raises(SettingsError):
         wrapped(tmp_path / 'robot.db', [], resume_from=7).execute()
     assert wrapped(tmp_path / 'robot.db', []).execute() == 'succeeded'
+
+
+def test_a_moment_of_another_machine_of_the_program_is_not_for_this_one(tmp_path):
+    store, moved = tmp_path / 'robot.db', []
+    for name in ('OTHER', 'TOP'):
+        with pytest.raises(KeyboardInterrupt):
+            wrapped(store, Interrupted(), name).execute()
+    with contextlib.closing(StoreFile(str(store))) as opened:
+        (other,), (own,) = opened.trials('OTHER'), opened.trials('TOP')
+        number = opened.moments(other.number)[-1].number
+        last = opened.moments(own.number)[-1].number
+    machine, seen = wrapped(store, moved, resume_from=number, on_resume='recover'), []
+    machine.events.observers.append(seen.append)
+    assert (machine.execute(), moved) == ('succeeded', [1])
+    assert seen[0].data['moment'] == last, 'not an earlier one'
 
 
 def test_a_store_that_cannot_be_written_is_found_out_when_it_is_opened(tmp_path):
