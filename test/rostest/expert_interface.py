@@ -14,7 +14,7 @@ import rospy
 import rostest
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-from expert_fixtures import Asked, make_question
+from expert_fixtures import Asked, Process, make_question
 from waiting import wait_for
 
 from smach_oracle.expert.front_end import FrontEnd
@@ -33,6 +33,7 @@ from smach_oracle.ros.expert.client import ExpertQueryClient
 from smach_oracle.ros.userdata_codec import decode_all, encode_all
 
 SERVER = '/expert_interface/expert_query'
+SHARED = '/shared/expert_query'  # a node of its own
 
 
 class FakeInterface:
@@ -129,6 +130,38 @@ class TestInterfaces(unittest.TestCase):
         self.assertTrue(
             wait_for(lambda: not self.statuses()), 'it leaves the list when the interface ends'
         )
+
+    def shared_server(self):
+        server = Process.installed('expert_query_server', '__name:=shared')
+        self.addCleanup(server.kill)
+        return server
+
+    def test_an_interface_is_seen_to_run_also_by_a_server_that_comes_later_or_again(self):
+        client = ExpertQueryClient(SHARED)
+        self.addCleanup(client.close)
+        done = threading.Event()
+
+        def work(server):
+            done.wait(60.0)
+            server.set_succeeded(SharedAutonomyResult('succeeded', [], ''))
+
+        self.interface(work)
+        person = threading.Thread(target=self.run_interface, args=(client,), daemon=True)
+        person.start()
+        self.addCleanup(done.set)
+        for _ in range(2):
+            server = self.shared_server()
+            self.assertTrue(
+                wait_for(lambda: self.statuses() == [(OpenQuery.INTERFACE_RUNNING, '')]),
+                'nobody sees that the robot waits for its interface',
+            )
+            server.kill()
+            self.assertTrue(wait_for(lambda: not self.statuses()))
+        self.shared_server()
+        self.assertTrue(wait_for(self.statuses))
+        done.set()
+        person.join(20.0)
+        self.assertTrue(wait_for(lambda: not self.statuses()), 'it has left the list')
 
     def test_an_interface_that_is_not_there_is_waited_for_only_so_long(self):
         impatient = ExpertQueryClient(SERVER, server_wait_s=2.0)

@@ -103,14 +103,18 @@ class ExpertQueryClient(Expert):
             where it ends without a result, and where its outputs cannot be read.
         """
         progress('interface_start', offer.name, '')
-        announcement = self._announce(offer, question)
+        ended = threading.Event()
+        announcing = threading.Thread(
+            target=self._announce, args=(offer, question, ended), name='announce', daemon=True
+        )
+        announcing.start()
         answer = None
         try:
             result = self._run(offer, question, cancelled)
             answer = None if result is None else _to_supersede(result)
         finally:
-            if announcement is not None:
-                announcement.cancel()
+            ended.set()
+            announcing.join()
             progress('interface_end', offer.name, answer.outcome if answer else '')
         return answer
 
@@ -123,14 +127,15 @@ class ExpertQueryClient(Expert):
         if self.server is not None:
             self.server.stop()
 
-    def _announce(self, offer: InterfaceOffer, question: Question) -> Optional[SentGoal]:
-        """Show the front ends, while this goal lives, that an interface runs for the question."""
-        if not self._link.ready():
-            return None
+    def _announce(self, offer: InterfaceOffer, question: Question, ended: threading.Event) -> None:
+        """Show the front ends that an interface runs for the question, until it has ended.
+
+        A server that comes later, or is restarted, is told as well.
+        """
         goal = to_goal(question, self.robot)
         goal.interface = offer.name
         goal.deadline = 0.0
-        return self._link.send(goal)
+        _SentQuestion(self._link, goal, lambda *_: None).run(ended)
 
     def _run(
         self, offer: InterfaceOffer, question: Question, cancelled: threading.Event
@@ -256,7 +261,12 @@ class _SentQuestion:
         self._sent = self._link.send(self._goal)
         self._times_sent += 1
         if self._times_sent > 1:
-            rospy.loginfo('Question %s is asked again at %s', self._goal.query_id, self._link.name)
+            rospy.loginfo(
+                'Question %s is %s again at %s',
+                self._goal.query_id,
+                'shown with its interface' if self._goal.interface else 'asked',
+                self._link.name,
+            )
 
     def _lose(self, what: str) -> None:
         rospy.logwarn(
