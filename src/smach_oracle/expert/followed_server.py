@@ -179,7 +179,8 @@ class FollowedServer:
 
 
 def _listed(server: str, entry: OpenQuery, now_s: float) -> ListedQuestion:
+    age_s = entry.age if math.isfinite(entry.age) else 0.0  # a server may say what it likes
     deadline_s = now_s + entry.remaining if entry.remaining >= 0 else math.inf
     return ListedQuestion(
-        server, entry.query, entry.status, entry.claimed_by, now_s - entry.age, deadline_s
+        server, entry.query, entry.status, entry.claimed_by, now_s - age_s, deadline_s
     )

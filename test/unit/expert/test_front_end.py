@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from smach_oracle.expert import followed_server
 from smach_oracle.expert import front_end as module
 from smach_oracle.expert.claims import MOST_MISSED, ClaimKeeper
 from smach_oracle.expert.followed_server import ListedQuestion
@@ -194,3 +195,16 @@ def test_the_front_end_of_the_documentation_answers_what_nobody_works_on_and_out
     assert (
         front_end.claimed == ['first', 'second', 'third'] and front_end.released[-1] == 'third'
     ), 'left by Ctrl-C'
+
+
+@pytest.mark.parametrize('age', [float('inf'), float('-inf'), float('nan')])
+def test_a_question_whose_server_tells_no_age_counts_as_new(age, monkeypatch):
+    monkeypatch.setattr(followed_server.rospy, 'Subscriber', lambda *_, **__: None)
+    monkeypatch.setattr(followed_server, 'publishers_of', lambda _topic: ['/robot'])
+    monkeypatch.setattr(followed_server.time, 'monotonic', lambda: 50.0)
+    server = followed_server.FollowedServer('/robot/expert_query', lambda: None)
+    message = OpenQueries(queries=[OpenQuery(age=age, remaining=float('nan'))])
+    message._connection_header = {'callerid': '/robot'}
+    server._on_list(message)
+    (listed,) = server.questions()
+    assert (listed.asked_s, listed.deadline_s) == (50.0, float('inf'))

@@ -221,6 +221,12 @@ def test_the_list_of_questions_shows_who_works_on_what_and_the_time_left():
     assert 'interface assist' in second
 
 
+def test_numbers_that_are_none_end_no_terminal():
+    choice = StateChoice('DETECT', math.nan, 1, 2, (), (), helped=1, tried=0, helped_s=math.inf)
+    text = shown(render.question(goal(rate=math.nan, choices=(choice,)), math.inf))
+    assert 'asked ? ago' in text and 'nan%' in text
+
+
 @pytest.mark.parametrize(
     'seconds, text', [(-3, '0 s'), (59.9, '59 s'), (125, '2:05 min'), (5400, '1:30 h')]
 )

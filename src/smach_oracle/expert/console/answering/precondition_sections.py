@@ -1,5 +1,6 @@
 """The preconditions of the choices of open questions, as the robots publish them now."""
 
+import math
 import threading
 import time
 from collections import OrderedDict
@@ -66,7 +67,7 @@ def status_view(message: PreconditionChecks, now: float) -> StatusByState:
     """
     found: StatusByState = {}
     for check in message.checks:
-        checked = round(now - check.age, 1) if check.age >= 0 else None
+        checked = round(now - check.age, 1) if 0 <= check.age < math.inf else None
         found.setdefault(check.state, []).append(
             {
                 'name': check.name,

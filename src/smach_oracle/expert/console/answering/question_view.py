@@ -127,7 +127,7 @@ def _choices(
             'repeats': list(choice.repeats),
             'runs_again': list(choice.runs_again),
             'helped': _helped(choice, recovery_counts),
-            'helped_s': choice.helped_s if choice.tried else None,
+            'helped_s': number(choice.helped_s) if choice.tried else None,
             'recommended': choice.recommended,
         }
         for choice in goal.choices

@@ -167,8 +167,10 @@ def test_userdata_is_shown_by_kind():
 
 
 def test_markup_and_odd_numbers_are_data_like_any_other():
-    shown = view(text='<script>alert(1)</script>', rate=math.nan)
+    choice = StateChoice('DETECT', math.inf, 1, 2, (), (), tried=3, helped_s=math.nan)
+    shown = view(text='<script>alert(1)</script>', rate=math.nan, choices=(choice,))
     assert shown['text'] == '<script>alert(1)</script>' and shown['rate'] is None
+    assert json.dumps(shown, allow_nan=False)
     assert len(view(text='x' * 100000)['text']) < 10000
 
 

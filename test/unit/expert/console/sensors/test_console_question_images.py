@@ -124,6 +124,7 @@ def test_preconditions_are_kept_by_question_and_robot(monkeypatch):
     checks = [
         PreconditionCheck('PICK', 'free', PreconditionCheck.HOLDS, 'yes', 2.0),
         PreconditionCheck('PICK', 'door', PreconditionCheck.UNKNOWN, '', -1.0),
+        PreconditionCheck('PICK', 'odd', PreconditionCheck.HOLDS, '', float('inf')),
     ]
     monkeypatch.setattr(precondition_sections.time, 'time', lambda: 1000.0)
     board.taker('/beta')(PreconditionChecks(query_id='q1', checks=checks))
@@ -136,6 +137,7 @@ def test_preconditions_are_kept_by_question_and_robot(monkeypatch):
             'PICK': [
                 {'name': 'free', 'holds': True, 'text': 'yes', 'checked': 998.0},
                 {'name': 'door', 'holds': None, 'text': '', 'checked': None},
+                {'name': 'odd', 'holds': True, 'text': '', 'checked': None},
             ]
         }
     }
