@@ -4,6 +4,7 @@ A prompt ends when the thing that it asks about is over.
 """
 
 import asyncio
+import time
 from typing import Callable, List, Optional, Sequence, Tuple
 
 from prompt_toolkit import PromptSession
@@ -44,6 +45,12 @@ class Prompts:
     ) -> None:
         self._input = terminal_input
         self._output = terminal_output
+        self._pressed_s = time.monotonic()
+
+    @property
+    def idle_s(self) -> float:
+        """The time (s) for which no key was pressed."""
+        return time.monotonic() - self._pressed_s
 
     def ask(
         self,
@@ -71,8 +78,15 @@ class Prompts:
             validator=validator,
             validate_while_typing=False,
             reserve_space_for_menu=6 if choices else 0,
-            pre_run=lambda: _watch(session, why_to_stop),
+            pre_run=lambda: self._watch(session, why_to_stop),
         ).strip()
+
+    def _watch(self, session: 'PromptSession[str]', why_to_stop: Reason) -> None:
+        session.app.key_processor.before_key_press += lambda _: self._note_press()
+        _watch(session, why_to_stop)
+
+    def _note_press(self) -> None:
+        self._pressed_s = time.monotonic()
 
 
 def _watch(session: 'PromptSession[str]', why_to_stop: Reason) -> None:

@@ -42,6 +42,7 @@ _COMMANDS: List[Choice] = [
     ('q', 'quit'),
 ]
 _FIRST_LIST_S = 1.0
+IDLE_S = 300.0  # without a key: who has left the terminal must keep no question from others
 _RETURN_S = 20.0  # how long a server may take to come back, and its robots to ask it again
 
 
@@ -84,7 +85,10 @@ class Terminal:
             self._front_end.stop()
 
     def _pick(self) -> ListedQuestion:
-        """The question to work on: the only new one, else the one whose number is typed."""
+        """The question to work on: the only new one, else the one whose number is typed.
+
+        While nobody is at the terminal, none is opened by itself.
+        """
         while True:
             waiting = self._waiting()
             fresh = [
@@ -92,7 +96,7 @@ class Terminal:
                 for each in waiting
                 if each.key not in self._left_to_others and each.status == OpenQuery.PENDING
             ]
-            if len(waiting) == 1 and fresh:
+            if len(waiting) == 1 and fresh and self._prompts.idle_s < IDLE_S:
                 return fresh[0]
             try:
                 if not waiting:
@@ -308,6 +312,11 @@ class Terminal:
 
     def _why_to_stop(self, listed: ListedQuestion) -> Optional[str]:
         """Return why to stop working on a question, or None as long as it is ours to answer."""
+        if self._prompts.idle_s >= IDLE_S:
+            self._left_to_others.add(listed.key)
+            return 'No key was pressed for {}: the question is left to others.'.format(
+                duration(IDLE_S)
+            )
         if not self._front_end.connected(listed.server):
             return self._gone_for_good('{} is gone.'.format(listed.server))
         now = self._front_end.find(listed.key)

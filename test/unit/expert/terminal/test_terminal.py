@@ -15,6 +15,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.output import DummyOutput
 from rich.console import Console
 from typist import CTRL_C, CTRL_D, CTRL_U, ENTER, typist
+from waiting import stays
 
 from smach_oracle.expert.followed_server import ListedQuestion
 from smach_oracle.expert.terminal import terminal
@@ -315,6 +316,24 @@ def test_of_several_questions_one_is_picked_by_its_number():
     assert "'7' is not one of 1 to 2" in shown and "'²' is not one of 1 to 2" in shown
     assert 'PICK_AND_PLACE/OPEN_FRIDGE' in shown
     assert front_end.claims[0] == ('q2', False)
+
+
+def test_who_has_left_the_terminal_keeps_no_question_from_others(monkeypatch):
+    monkeypatch.setattr(terminal, 'IDLE_S', 1.0)
+    front_end, untouched = FakeFrontEnd(goal()), []
+    shown = converse(
+        front_end,
+        'r' + ENTER,
+        ('the question is left to others', lambda: front_end.listed.clear()),
+        (WAITING, lambda: front_end.listed.extend(FakeFrontEnd(goal('q2')).listed)),
+        # the terminal has this one on its list, and takes it only from the one who comes back
+        ('', lambda: untouched.append(stays(lambda: len(front_end.claims) == 1, 0.6))),
+        ('', '1' + ENTER),
+        (lambda: ('q2', False) in front_end.claims, 'q' + ENTER),
+    )
+    assert 'No key was pressed for 1 s: the question is left to others.' in shown
+    assert front_end.claims == [('q1', False), ('q2', False)]
+    assert untouched == [True] and front_end.released == ['q1', 'q2']
 
 
 def test_a_question_left_to_others_is_offered_again_but_not_opened_by_itself():
