@@ -87,12 +87,11 @@ class FailureRing:
         names = sum(4 + len(name) for name in joints.name)
         values = len(joints.position) + len(joints.velocity) + len(joints.effort)
         size = _OF_A_FLOAT * values + _OF_AN_OBJECT
-        if self._names.get(topic) != joints.name:
-            self._names[topic] = list(joints.name)
+        known = self._names.get(topic, [])
+        if known != joints.name:  # several nodes may publish one topic, each in its own thread
+            known = self._names[topic] = list(joints.name)
             size += names + _OF_A_NAME * len(joints.name)
-        kept = JointState(
-            joints.header, self._names[topic], joints.position, joints.velocity, joints.effort
-        )
+        kept = JointState(joints.header, known, joints.position, joints.velocity, joints.effort)
         wire = names + 8 * values + len(joints.header.frame_id) + _OF_A_HEADER
         with self._lock:
             number = next(self._numbers)

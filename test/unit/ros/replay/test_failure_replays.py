@@ -1,5 +1,6 @@
 """The last seconds before a failure: bounded in memory, for the question and for the bag."""
 
+import itertools
 import random
 import threading
 from types import SimpleNamespace
@@ -264,6 +265,28 @@ def test_nodes_that_share_a_topic_of_joints_are_thinned_out_each_by_itself(robot
         robot.pass_time(0.1)
     names = [joints.name for joints in robot.ask().joints]
     assert names.count(['arm']) == names.count(['gripper']) == 10
+
+
+def test_positions_keep_their_names_while_another_node_publishes_the_topic(robot):
+    robot.keep()
+
+    nodes = itertools.count()
+
+    def publish(names, position):
+        message = JointState(name=names, position=[position])
+        message._connection_header = {'callerid': '/node_{}'.format(next(nodes))}
+        robot.topics[JOINTS](message)
+
+    class Overtaken(list):
+        """Names: while they are counted, another thread takes in a gripper's."""
+
+        def __len__(self):
+            publish(['gripper'], 0.04)
+            return super().__len__()
+
+    publish(Overtaken(['arm']), 1.0)
+    told = [(*joints.name, *joints.position) for joints in robot.ask().joints]
+    assert set(told) == {('gripper', 0.04), ('arm', 1.0)}
 
 
 def test_a_topic_that_is_named_twice_is_waited_for_once(robot):
