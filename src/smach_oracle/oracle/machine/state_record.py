@@ -225,10 +225,13 @@ class StateRecord:
     def _class_of(self, rate: float) -> FailureClass:
         return classify(rate, self.settings.moderate_from, self.settings.high_from)
 
-    def read_rate(self) -> RateReading:
-        """Return what the results so far say."""
+    def read_rate(self, and_failure: bool = False) -> RateReading:
+        """Return what the results so far say. `and_failure`: and one failure more."""
         with self._lock:
             estimator = self._up_to_date()
+            if and_failure:
+                estimator = copy.deepcopy(estimator)
+                estimator.add(True)
             rate, recent = estimator.rate, estimator.recent
             successes = estimator.successes
             what, then = self._tried

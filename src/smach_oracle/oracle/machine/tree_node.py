@@ -14,7 +14,7 @@ from ..smach_private import EngineProbe, Labels, data_of, is_executing, mark_of,
 from .container_records import ContainerRecords, ContainerSettings
 from .execution import Execution
 from .site import Site
-from .state_record import RateReading, StateRecord
+from .state_record import StateRecord
 from .tree import Tree
 from .userdata import copied
 
@@ -242,19 +242,10 @@ class TreeNode:
         if events.observers:
             events.emit(kind, self.path, self.trial_id, state, outcome, target, **more)
 
-    def emit_rated(
-        self,
-        kind: EventKind,
-        record: StateRecord,
-        reading: Optional[RateReading] = None,
-        **fields: Any,
-    ) -> None:
-        """Tell the observers of what happens to a state, with its failure rate and class.
-
-        `reading`: of the rate before. None means that of now.
-        """
+    def emit_rated(self, kind: EventKind, record: StateRecord, **fields: Any) -> None:
+        """Tell the observers of what happens to a state, with its failure rate and class."""
         if self.events.observers:
-            reading = reading or record.read_rate()
+            reading = record.read_rate()
             fields['failure_class'], fields['rate'] = int(reading.failure_class), reading.rate
             self.emit(kind, record.label, **fields)
 

@@ -63,7 +63,7 @@ def _ask_at_once(recovery: Recovery) -> Optional[Decided]:
 
 def _follow_policy(recovery: Recovery, why_not_above: WhyNotAbove) -> Decided:
     node, record, policy = recovery.node, recovery.record, recovery.node.in_force.policy
-    reading = recovery.reading = record.read_rate()
+    reading = recovery.reading = recovery.reading or record.read_rate()
     drawn = '{}/{} {}'.format(node.path, record.label, record.visits) if policy.draws else ''
     situation = Situation(
         reading.failure_class,

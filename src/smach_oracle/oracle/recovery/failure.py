@@ -18,7 +18,7 @@ from ..machine.nesting import gave_up_in, items_under_way, nodes_in
 from ..machine.places import failure_context
 from ..machine.resumed import Unfinished
 from ..machine.site import Route, failure_kind, route_of
-from ..machine.state_record import RateReading, StateRecord
+from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import Overrun
 from ..records.events import EventKind, FailureKind
@@ -216,13 +216,11 @@ def tell_failure(
     record: StateRecord,
     failure: Failure,
     continuous: bool = False,
-    reading: Optional[RateReading] = None,
 ) -> None:
-    """Tell the observers. `reading`: of the rate, without this failure. None: that of now."""
+    """Tell the observers, with the rate of now: without this failure."""
     node.emit_rated(
         EventKind.FAILURE,
         record,
-        reading,
         outcome=failure.outcome,
         failure_kind=int(failure.kind),
         continuous=continuous,

@@ -175,23 +175,21 @@ def _decide_above(recovery: Recovery, level: TreeNode, failure: Failure) -> Opti
     context = failure_context(level, record)
     continuous = level.in_force.policy.is_continuous(context)
     above = Recovery(level, record, failed(failure, context, continuous), recovery)
-    reading = record.read_rate()
-    record.learn(True)
+    above.reading = record.read_rate(and_failure=True)
     decided = decide_on_level(above, partial(foreseen_above, level, natural_ending(level, failure)))
     facts = decided[1]
     above.cause = cause_of(facts)
     recovery.tried += ['{}: {}'.format(level.path, each) for each in above.tried]
     way = jump_path_to(below, above.jump_path.place) if above.jump_path is not None else None
     if recovery.is_over():  # by a preempt while its preconditions ran
-        record.take_back_failure()
         return None
     if above.jump_path is None or way is None:
-        record.take_back_failure()
         recovery.settle(None)
         recovery.tried.append('{}: {}: asks too'.format(level.path, above.cause))
         return None
     level.records.note_failure(record)
-    tell_failure(level, record, failure, continuous, reading)
+    tell_failure(level, record, failure, continuous)
+    record.learn(True)
     sentence = tell_decision(above, decided)
     recovery.recovered.append(record)
     kept, restarts = above.jump_path.kept(above.watch), facts.action is Action.RESTART

@@ -7,7 +7,7 @@ import pytest
 from killed_machines import Diary, KilledMachine, Noted, Points, around, in_a_process
 from killed_trees import make
 from left_stores import Left
-from machines import FakeWaiting, Watched
+from machines import FakeExpert, FakeWaiting, Watched, supersede
 
 import smach
 from smach_oracle.oracle import oracle_of
@@ -166,3 +166,28 @@ def test_a_recovery_that_has_left_its_container_counts_after_a_crash(tmp_path, s
     assert killed.diary.count('begins') == {'FIND': 2, 'GRASP': 1}
     assert killed.run(on_resume='state:FIND')['outcome'] == 'aborted'
     assert killed.diary.count('begins') == {'FIND': 3, 'GRASP': 2}
+
+
+def test_a_level_above_that_was_killed_as_it_decided_has_learned_of_no_failure(tmp_path):
+    """GRASP fails, its oracle would ask, and that of PICK runs the precondition of PICK."""
+
+    def build(diary, points):
+        pick = smach.StateMachine(['succeeded', 'aborted'], ['done'], ['done'])
+        with pick:
+            smach.StateMachine.add('GRASP', Noted('GRASP', diary, points, failures=2), ENDS)
+        return around('PICK', pick, ENDS)
+
+    def is_near(userdata):
+        killed.diary.write('begins', 'is_near')
+        if killed.diary.count('begins')['is_near'] == 1:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return True
+
+    states = {'GRASP': {'prior': 0.5}, 'PICK': {'preconditions': [is_near]}}
+    killed = KilledMachine(tmp_path, build, states=states, escalate=True, memory=1000)
+    assert killed.run(expert=FakeExpert()) is None
+    told = killed.run(expert=FakeExpert(supersede('succeeded')))
+    assert told['outcome'] == 'succeeded'
+    failures = [state for kind, _, state in told['events'] if kind == 'FAILURE']
+    assert failures.count('PICK') == 2, 'of the program that was killed none was told'
+    assert ['TOP', 'PICK', 1, 2] in told['rates']
