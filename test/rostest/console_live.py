@@ -36,6 +36,30 @@ return Promise.all(paths.map((path) => import("/static/js/" + path))).then((
   tell(9);
   return [silent, liveness.gone({ server: "s", robot: "/r" })];
 });"""
+# what a page says of a question that has gone: of a robot that was killed or lived on, and of one
+# whose shared server has gone
+WENT = (
+    OF_A_QUESTION
+    % """
+  const heard = (age, connected = true) => store.receive({ now: 0, sections: {
+    servers: [{ name: "s", connected }],
+    heard: { beat: 1, master: 0, servers: { s: 0 }, robots: { "/r": age } } } });
+  const after = async (...ages) => {
+    heard(0.5);
+    said("");
+    await new Promise((done) => { setTimeout(done, 20); });
+    store.receive({ now: 0, sections: { questions: [] } });
+    await new Promise((done) => { setTimeout(done, 20); });
+    ages.forEach((age) => heard(age));
+    return detail.root.querySelector(".claim-bar").textContent;
+  };
+  const found = [await after(4), await after(0, 9)];
+  found.push(await after(4, 9));
+  said("");
+  heard(0.5, false);
+  store.receive({ now: 0, sections: { questions: [] } });
+  return [...found, detail.root.querySelector(".claim-bar").textContent];"""
+)
 # a claim that runs out, and cannot be made again at once: whether it is kept, and how often it was
 # asked for
 KEPT = (
@@ -132,6 +156,13 @@ class Live(ConsolePage, unittest.TestCase):
         return browser.says(SILENT.format(who), '.silence-bar') and wait_for(
             lambda: browser.run(GREY) == 'grayscale(1)' and not browser.find(ANSWER).is_enabled()
         )
+
+    def test_2_a_question_that_goes_says_whether_its_robot_went(self):
+        at_first, lived_on, killed, no_server = self.browser.run(WENT)
+        self.assertIn('answered elsewhere', at_first)
+        self.assertIn('answered elsewhere', lived_on)
+        self.assertIn('/r is gone', killed)
+        self.assertIn('s is gone. /r asks again', no_server)
 
     def test_1_the_ages_of_the_last_words_are_shown(self):
         browser = self.browser

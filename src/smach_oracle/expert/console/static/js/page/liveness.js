@@ -90,16 +90,19 @@ export class Liveness {
   refusalOfRobot(robot) { return unheard(this.whoOf(robot)); }
 
   /**
-   * Why a question is gone, where its robot is; '' where that is not known: from a console or a
-   * master that is silent nothing is heard of any robot.
+   * Why a question is gone, where its robot or its shared server is; '' where that is not known:
+   * from a console or a master that is silent nothing is heard of any robot.
    * @param {server.Question} question
    */
   gone({ server, robot }) {
     if (this.silent) return '';
     const known = (this.store.get('servers') || []).find(({ name }) => name === server);
-    if (known?.connected && !this.isSilent(robot)) return '';
-    return robot + ' is gone: its process has ended, or cannot be reached. Its question went with '
-      + 'it. ';
+    const ownServer = server.startsWith(robot + '/'); // it ends with the robot
+    if (this.isSilent(robot) || (!known?.connected && ownServer)) {
+      return robot + ' is gone: its process has ended, or cannot be reached. Its question went '
+        + 'with it. ';
+    }
+    return known?.connected ? '' : server + ' is gone. ' + robot + ' asks again once it is back. ';
   }
 
   /** For the top bar. */

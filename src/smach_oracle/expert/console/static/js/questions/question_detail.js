@@ -60,6 +60,7 @@ export class QuestionDetail {
     this.interfacePlace = h('div', { class: 'workbench' });
     /** @type {string | null} */
     this.robotGone = null; // how it went, and the question with it; null: it was open until now
+    this.wentAt = Infinity; // ms, when the question went; -Infinity: its robot was heard since
     this.form = new AnswerForm(question, (answer) => this.answer(answer),
       () => { if (this.mayBegin && !this.settled) this.take(); });
     this.answers = h('section', { class: 'card answers' }, h('h3', {}, 'What should it do?'),
@@ -370,8 +371,16 @@ export class QuestionDetail {
 
   /** As it was when the question went; of one that is answered here nothing is said. */
   howItWent() {
-    if (this.now || this.settled) return null;
-    return this.robotGone === null ? this.app.liveness.gone(this.question) : this.robotGone;
+    const { app: { liveness }, question, robotGone } = this;
+    const nowMs = performance.now();
+    this.wentAt = this.now || this.settled ? Infinity : Math.min(this.wentAt, nowMs);
+    if (this.wentAt === Infinity) return null;
+    const age = liveness.robot(question.robot);
+    if (robotGone === '' && age !== null && age < (nowMs - this.wentAt) / 1000) {
+      this.wentAt = -Infinity; // what becomes of it now has nothing to do with the question
+    }
+    // a robot that was killed counts as silent only after a while
+    return robotGone || (this.wentAt === -Infinity ? '' : liveness.gone(question));
   }
 
   show() {
