@@ -24,7 +24,8 @@ from .records.visits import StateRateRow, TransitionRow
 from .settings.health import HealthFunction
 from .settings.names import Nested, Strictness, checked_nested
 from .settings.settings import PreconditionLists, SettingsLike, as_settings
-from .smach_private import Transitions, data_of, keys_of, opened_container
+from .smach_private import Transitions, data_of, is_executing, keys_of, opened_container
+from .under_way import is_under_way_elsewhere
 
 EDGE_TO_ORACLE = 'failure'
 TRANSITION = EventKind.TRANSITION  # looked up once
@@ -294,7 +295,7 @@ class OracleContainer(smach.StateMachine):
 
         It raises what a StateMachine raises.
         """
-        if self._oracle.tree.is_parents() and not self.is_running():
+        if self._oracle.tree.is_parents() and not is_executing(self):
             return execute_bare(self, *args, **kwargs)
         run = ContainerRun(self._oracle)
         try:
@@ -306,6 +307,14 @@ class OracleContainer(smach.StateMachine):
         finally:
             run.is_over()
         return run.outcome
+
+    def is_running(self) -> bool:
+        """Whether it is executed, also while the oracle begins or ends the trial.
+
+        As with a bare machine, another thread may wait for its end as long as this is true.
+        """
+        is_running: bool = super().is_running()
+        return is_running or is_under_way_elsewhere(self)
 
     def request_preempt(self) -> None:
         """Ask it to stop, and wake what waits in its tree, such as an operator's hold."""

@@ -19,7 +19,7 @@ from .machine.tree_node import TreeNode, node_of
 from .records.events import EventKind
 from .settings.names import PathPattern
 from .settings.settings import AUTONOMY_LEVELS
-from .smach_private import current_label_of
+from .smach_private import current_label_of, is_executing
 
 
 class ActiveState(NamedTuple):
@@ -203,7 +203,7 @@ class OperatorHand:
                 )
             )
         sent = jump_path_for(place).meeting_node
-        if sent.machine.is_running():
+        if is_executing(sent.machine):
             text = self._ask_jump(
                 sent,
                 Jump(
@@ -356,7 +356,7 @@ class OperatorHand:
         found = []
         for node in nodes_of(self._top.machine):
             label = current_label_of(node.machine)
-            if node.machine.is_running() and label and node.key not in at_boundary:
+            if is_executing(node.machine) and label and node.key not in at_boundary:
                 found.append(ActiveState(node.path, label, '', False))
         return found + [
             ActiveState(

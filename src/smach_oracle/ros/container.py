@@ -23,6 +23,7 @@ from smach_oracle.oracle.identity import WeakIdentityMap
 from smach_oracle.oracle.settings.health import HealthFunction
 from smach_oracle.oracle.settings.names import Nested, Strictness
 from smach_oracle.oracle.settings.settings import PreconditionLists, Settings
+from smach_oracle.oracle.under_way import is_stepping, under_way
 
 from .expert.failure_text import describe_failure
 from .loaded_settings import (
@@ -134,10 +135,10 @@ class OracleContainer(BareContainer):
         :raises OSError: where the folder for the bags cannot be made or written.
         """
         oracle = oracle_of(self)
-        if not oracle.is_top or self.is_running() or oracle.is_parents:
+        if not oracle.is_top or is_stepping(self) or oracle.is_parents:
             return super().execute(*args, **kwargs)
         _tell_of_ros(self)
-        with _attached(self, self):
+        with under_way(self), _attached(self, self):
             return super().execute(*args, **kwargs)
 
 

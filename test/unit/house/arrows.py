@@ -30,6 +30,7 @@ ARROWS: Dict[str, Set[str]] = {
         'oracle.settings',
         'oracle.control',
         'oracle.operator_hand',
+        'oracle.under_way',
         'oracle.OracleContainer',
         'oracle.oracle_of',
         'bag_format',

@@ -25,7 +25,8 @@ from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
 from ..recovery.verdict import outcome_of_early_end
 from ..settings.failure_rule import RULE, FailureRule
-from ..smach_private import initial_label_of, states_of
+from ..smach_private import initial_label_of, is_executing, states_of
+from ..under_way import under_way
 from .origin import inputs_of, origin_of
 from .wrapping import adopt, bring_up_to_date
 
@@ -52,8 +53,9 @@ class ContainerRun(Execution):
         node = self._node
         is_top = not node.has_running_ancestor()
         if is_top:
+            around = self._around = ExitStack()
+            around.enter_context(under_way(node.machine))
             if node.parent is not None:
-                around = self._around = ExitStack()
                 around.enter_context(node.tree.around_nested_trial(node.machine))
             node.tree.early_end.begin_trial(is_stored=False)  # the one before may have ended early
         if not self.look_around():
@@ -83,7 +85,7 @@ class ContainerRun(Execution):
         node.tree.begin_trial(new_trial_id() if resumed is None else resumed.trial.trial_id)
         for each in nodes:
             # one that still runs was abandoned in an earlier trial, and is left there
-            if not each.machine.is_running():
+            if not is_executing(each.machine):
                 each.begin_trial(node.tree.trial_id)
         begin_watching(node.tree, nodes)
         node.tree.restarts.begin_trial(

@@ -20,6 +20,7 @@ from smach_msgs.msg import SmachContainerInitialStatusCmd
 from smach_oracle.oracle.errors import TrialError
 from smach_oracle.oracle.identity import own_mark
 from smach_oracle.oracle.operator_hand import OperatorHand
+from smach_oracle.oracle.under_way import is_stepping
 
 _SAME_S = 1.0
 """Clients repeat a command several times a second until a status shows it; that is one wish."""
@@ -76,7 +77,7 @@ class ViewerCommands:
             hand = OperatorHand(container)
         except TrialError:
             return None
-        if not container.is_running():
+        if not is_stepping(container):
             hand.begins_in(label)
             return None
         wish = (id(container), label)
