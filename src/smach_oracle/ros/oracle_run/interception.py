@@ -13,6 +13,7 @@ from typing import Any, Callable, Iterator, List, Optional, Tuple, Type
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
 from smach_oracle.oracle.identity import WeakIdentityMap, own_mark
+from smach_oracle.oracle.under_way import is_under_way, seen_to_run, under_way
 
 WrapFunction = Callable[[smach.StateMachine], None]
 MARK = '_asks_for_an_oracle'
@@ -50,15 +51,19 @@ class Interception:
             self._patch(cls)
         self._patch_future_subclasses()
 
-    def before_execute(self, machine: smach.StateMachine) -> bool:
-        """Wrap the machine where that is due.
+    def is_missed(self, machine: OracleContainer) -> bool:
+        """Whether a call of the engine's `execute` has not come through that of the oracle.
 
-        :returns: whether it was wrapped just now.
+        So it is where the program calls a method that it took while the machine was bare.
         """
-        if isinstance(machine, OracleContainer):
-            if self._why_left is not None and oracle_of(machine).is_top:
-                self._leave(machine)
+        if not oracle_of(machine).is_top:
             return False
+        if self._why_left is not None:
+            self._leave(machine)
+        return not is_under_way(machine)
+
+    def before_execute(self, machine: smach.StateMachine) -> bool:
+        """Wrap a bare machine where that is due, and return whether it is wrapped now."""
         if os.getpid() != self._process:
             if self._told_in != os.getpid():
                 self._told_in = os.getpid()
@@ -67,9 +72,10 @@ class Interception:
                 )
             return False
         with self._lock:
-            if machine in self._left_bare:
-                return False
-            self._wrap(machine)
+            if machine in self._left_bare or isinstance(machine, OracleContainer):
+                return isinstance(machine, OracleContainer)
+            with seen_to_run(machine):  # its program may wait for its end already
+                self._wrap(machine)
             self._wrapped[machine] = True
             for child in machines_inside(machine):
                 if not isinstance(child, OracleContainer):
@@ -89,12 +95,18 @@ class Interception:
         original = cls.execute  # its own, or one that a mix-in brings
         if own_mark(original, MARK) or issubclass(cls, OracleContainer):
             return
-        before_execute = self.before_execute
+        is_missed, before_execute = self.is_missed, self.before_execute
 
         @functools.wraps(original)
         def execute(machine: smach.StateMachine, *args: Any, **kwargs: Any) -> Any:
-            if before_execute(machine):
-                return machine.execute(*args, **kwargs)  # its class is another one now
+            if isinstance(machine, OracleContainer):
+                if is_missed(machine):
+                    return type(machine).execute(machine, *args, **kwargs)
+                return original(machine, *args, **kwargs)
+            with under_way(machine):
+                if before_execute(machine):
+                    # its class is another one now; the machine may have an `execute` of its own
+                    return type(machine).execute(machine, *args, **kwargs)
             return original(machine, *args, **kwargs)
 
         setattr(execute, MARK, True)
