@@ -1,11 +1,13 @@
 """A pause between the items of an Iterator, and before a precondition."""
 
 import pickle
+import threading
 
 import pytest
 from held_machines import Gate, Held
 from machines import Scripted, chain_of
-from waiting import stays
+from test_time_limits import LimitClock
+from waiting import stays, wait_for
 
 import smach
 from smach_oracle.oracle import OracleContainer, unwrap
@@ -63,6 +65,44 @@ def test_a_preempt_ends_an_iterator_that_waits(ask, nested, runs) -> None:
         ask(held)
         assert held.end() == 'preempted'
     assert state.runs == runs  # a state without an oracle of its own runs under the request
+
+
+def in_a_branch(machine: smach.StateMachine) -> smach.StateMachine:
+    """A machine whose state EACH is a Concurrence, with that EACH in its branch."""
+    branches = smach.Concurrence(
+        ['done', 'aborted', 'preempted'], 'aborted', outcome_map={'done': {'ITEMS': 'done'}}
+    )
+    with branches:
+        smach.Concurrence.add('ITEMS', machine['EACH'])
+    outer = smach.StateMachine(outcomes=['done', 'aborted', 'preempted'])
+    with outer:
+        smach.StateMachine.add('EACH', branches)
+    return outer
+
+
+@pytest.mark.parametrize('nested', [True, False])
+@pytest.mark.parametrize(
+    'placed, waits_before',
+    [(lambda machine: machine, 'EACH/ITEM'), (in_a_branch, 'EACH/ITEMS/ITEM')],
+)
+def test_the_limit_of_an_iterator_stands_still_while_an_item_waits(
+    placed, waits_before, nested, monkeypatch
+) -> None:
+    clock, over, gate = LimitClock(monkeypatch), threading.Event(), Gate()
+    clock.end(1, over)
+    limited = {'EACH': {'time_limit_s': 30.0, 'grace_period_s': 5.0}}
+    machine = placed(items_machine(Scripted(gate)))
+    with Held(machine, settings={'nested': nested, 'states': limited}).begin() as held:
+        assert gate.entered.wait(20)
+        held.hand.pause()
+        gate.opened.set()
+        held.waits_before('SM_ROOT/' + waits_before)
+        over.set()
+        assert wait_for(clock.all_over)
+        assert stays(lambda: held.held() == ['SM_ROOT/' + waits_before], 0.1)
+        held.hand.resume()
+        assert held.end() == 'done'
+    assert not held.of(EventKind.FAILURE)
 
 
 def test_gates_go_with_the_oracle_and_stay_one() -> None:

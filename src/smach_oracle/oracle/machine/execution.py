@@ -7,7 +7,13 @@ from smach_common.foreign import error_text
 
 from ..records.events import NO_OUTCOME, EventKind
 from ..scope.scope import Reason, Scope, scopes_of_thread
-from ..smach_private import current_label_of, initial_label_of, set_executing, states_of
+from ..smach_private import (
+    Labels,
+    current_label_of,
+    initial_label_of,
+    set_executing,
+    states_of,
+)
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode
@@ -79,6 +85,15 @@ class Execution:
             return True
         runs = self.runs_around
         return bool(runs) and any(run.told is not None for run in runs)
+
+    def runs_around_below(self, labels: Labels) -> Tuple[Scope, ...]:
+        """Return `runs_around` of what takes place inside a state of the container.
+
+        :param labels: lead there. Without any it takes place in the container itself.
+        """
+        state = states_of(self._node.machine)[labels[0]] if labels else None
+        run = self._node.tree.workers.under_way.get(id(state))
+        return self.runs_around if run is None else (*self.runs_around, run)
 
     @property
     def scope_around(self) -> Scope:

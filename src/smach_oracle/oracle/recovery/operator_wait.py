@@ -37,16 +37,21 @@ def wait_for_operator(
     hold = control.hold_before(place, confirms, scope.reason is None)
     if hold is not None:
         hold.may_be_sent, hold.autonomy = False, autonomy
-        wait_until_let_go(node, hold, scope)
+        wait_until_let_go(node, hold, scope, below)
 
 
-def wait_until_let_go(node: TreeNode, hold: Hold, scope: Scope) -> Union[LetGo, Reason]:
+def wait_until_let_go(
+    node: TreeNode, hold: Hold, scope: Scope, below: Labels = ()
+) -> Union[LetGo, Reason]:
     """Wait until a hold is let go, or `scope` is cancelled, and return by what.
 
-    No lock of a machine is held. The time limits around the container stand still, and the minutes
-    of its trial.
+    No lock of a machine is held. The time limits around what waits stand still, and the minutes of
+    its trial.
+
+    :param below: as in `wait_for_operator`.
     """
     control, place, since_s = node.tree.control, hold.place, time.monotonic()
+    runs = node.execution.runs_around_below(below)
     control.begin(hold)
     let_go = None
     try:
@@ -54,7 +59,7 @@ def wait_until_let_go(node: TreeNode, hold: Hold, scope: Scope) -> Union[LetGo, 
         by = '' if hold.held_by is HeldBy.CONFIRM else control.paused_by
         smach.logwarn('{}: {}'.format(place.path, why))
         node.emit(EventKind.HOLD_START, place.state, hold.held_by.value, by=by, text=why)
-        with standing_still(node.execution.runs_around), node.tree.budget.paused():
+        with standing_still(runs), node.tree.budget.paused():
             let_go = control.wait(hold, scope)
             return let_go
     finally:
