@@ -70,6 +70,7 @@ class Prompts:
         session: 'PromptSession[str]' = PromptSession(
             input=self._input, output=self._output, style=_STYLE, refresh_interval=0.5
         )
+        session.app.key_processor.before_key_press += self._note_press
         return session.prompt(
             [('class:prompt', message)],
             bottom_toolbar=lambda: [('class:bottom-toolbar', ' ' + clean(toolbar()))],
@@ -78,14 +79,10 @@ class Prompts:
             validator=validator,
             validate_while_typing=False,
             reserve_space_for_menu=6 if choices else 0,
-            pre_run=lambda: self._watch(session, why_to_stop),
+            pre_run=lambda: _watch(session, why_to_stop),
         ).strip()
 
-    def _watch(self, session: 'PromptSession[str]', why_to_stop: Reason) -> None:
-        session.app.key_processor.before_key_press += lambda _: self._note_press()
-        _watch(session, why_to_stop)
-
-    def _note_press(self) -> None:
+    def _note_press(self, _: object) -> None:
         self._pressed_s = time.monotonic()
 
 

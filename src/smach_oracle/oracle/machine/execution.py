@@ -7,13 +7,7 @@ from smach_common.foreign import error_text
 
 from ..records.events import NO_OUTCOME, EventKind
 from ..scope.scope import Reason, Scope, scopes_of_thread
-from ..smach_private import (
-    Labels,
-    current_label_of,
-    initial_label_of,
-    set_executing,
-    states_of,
-)
+from ..smach_private import Labels, current_label_of, initial_label_of, set_executing, states_of
 
 if TYPE_CHECKING:
     from .tree_node import TreeNode
@@ -91,7 +85,9 @@ class Execution:
 
         :param labels: lead there. Without any it takes place in the container itself.
         """
-        state = states_of(self._node.machine)[labels[0]] if labels else None
+        if not labels:
+            return self.runs_around
+        state = states_of(self._node.machine)[labels[0]]
         run = self._node.tree.workers.under_way.get(id(state))
         return self.runs_around if run is None else (*self.runs_around, run)
 

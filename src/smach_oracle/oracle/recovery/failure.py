@@ -212,10 +212,7 @@ def in_words(failure: Failure) -> str:
 
 
 def tell_failure(
-    node: TreeNode,
-    record: StateRecord,
-    failure: Failure,
-    continuous: bool = False,
+    node: TreeNode, record: StateRecord, failure: Failure, continuous: bool = False
 ) -> None:
     """Tell the observers, with the rate of now: without this failure."""
     node.emit_rated(
