@@ -280,6 +280,12 @@ class Concurrence(Container):
         if userdata is not None:
             self.userdata.update(userdata)
 
+    @property
+    def _child_outcomes(self) -> Outcomes:
+        """Upstream's name for the outcomes so far of an execution under way."""
+        run = self._run
+        return {} if run is None else run.outcomes
+
     def get_active_states(self) -> List[str]:
         """Return the labels of the children that are running."""
         run = self._run

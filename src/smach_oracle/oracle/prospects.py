@@ -28,6 +28,7 @@ class OutcomeProspect(NamedTuple):
     route: Route
     is_failure: bool
     author_recovers: bool  # from this failure. The author's own transition is kept
+    may_stop_others: bool  # of its Concurrence, which is known once it fails: then it ends so
 
 
 class StateProspect(NamedTuple):
@@ -286,12 +287,13 @@ def _kinds(node: TreeNode, settings: StateSettings, before: Sequence[str]) -> It
 def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) -> OutcomeProspect:
     route = route_of(node.machine, label, outcome)
     kind = failure_kind(outcome, route, settings, node.in_force.failing)
+    fails = kind is not FailureKind.NOT_A_FAILURE
     return OutcomeProspect(
         outcome,
         node.site.shown_route(route, outcome),
-        kind is not FailureKind.NOT_A_FAILURE,
-        kind is not FailureKind.NOT_A_FAILURE
-        and node.site.foresees(outcome, route, kind, settings),
+        fails,
+        fails and node.site.foresees(outcome, route, kind, settings),
+        fails and node.site.may_stop_others(settings),
     )
 
 

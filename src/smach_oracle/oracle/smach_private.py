@@ -174,6 +174,12 @@ def note_passed_on(machine: smach.StateMachine) -> None:
 
 # which outcomes of its states a Concurrence maps to which of its own
 outcome_map_of: Callable[[Any], Mapping[str, Mapping[str, str]]] = attrgetter('_outcome_map')
+# what a Concurrence asks, as a state ends, whether others are to stop
+child_termination_cb_of: Callable[[Any], Optional[Callable[[Any], Any]]] = attrgetter(
+    '_child_termination_cb'
+)
+# the outcomes of its states while it executes, None of one that has not ended
+outcomes_so_far: Callable[[Any], Mapping[str, Optional[str]]] = attrgetter('_child_outcomes')
 # which outcome of the last item an Iterator maps to which of its own
 final_outcomes_of: Callable[[Any], Mapping[str, str]] = attrgetter('_final_outcome_map')
 # the outcomes after which an Iterator goes on. If there are none, all not to break

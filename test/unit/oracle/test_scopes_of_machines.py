@@ -93,7 +93,9 @@ def test_a_hold_in_a_branch_that_another_branch_ends(never_looks):
         return 'ok'
 
     both = smach.Concurrence(
-        outcomes=['done'], default_outcome='done', child_termination_cb=lambda outcomes: True
+        outcomes=['done'],
+        default_outcome='done',
+        child_termination_cb=lambda outcomes: outcomes['B'] is not None,
     )
     with both:
         smach.Concurrence.add('A', Scripted(is_held_afterwards))

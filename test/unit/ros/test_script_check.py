@@ -117,6 +117,29 @@ def test_the_report_says_what_the_oracle_may_do_in_each_state(check):
     assert 'OUTCOME succeeded' in errors and 'SAYS' not in report
 
 
+def test_the_report_says_where_the_other_branches_may_have_a_failure_kept(check):
+    code, report, errors = check(
+        """
+        both = smach.Concurrence(['succeeded', 'aborted'], 'aborted', outcome_map={},
+                                 child_termination_cb=lambda outcomes: True)
+        with both:
+            smach.Concurrence.add('BUMPER', Runs())
+            smach.Concurrence.add('DRIVE', Runs())
+        sm = smach.StateMachine(['succeeded', 'aborted'])
+        with sm:
+            smach.StateMachine.add('BOTH', both)
+        sm.execute()
+    """,
+        'states: {BOTH/DRIVE: {author_recoveries: override}}',
+    )
+    assert code == 0, errors
+    bumper, drive = report[report.index('  BUMPER (Runs)') :].split('  DRIVE (Runs)')
+    meant = 'failure, the oracle takes it up'
+    unless = ' unless child_termination_cb stops others'
+    assert meant + unless in ' '.join(bumper.split())
+    assert meant in drive and unless not in ' '.join(drive.split())
+
+
 PARKS = """
     carry = smach.StateMachine(['done', 'left'])
     with carry:

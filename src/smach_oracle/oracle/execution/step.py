@@ -273,8 +273,8 @@ class Step:
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
         if not node.tree.recover or self._author_recovers(failure):
             node.site.tell_item_passed_over(failure.state, failure.outcome)
-            if node.tree.recover:
-                self._tell_own_loop(failure)
+            if node.tree.recover and failure.route is not None:
+                self._tell_own_loop(failure.outcome, failure.route)
             return self._end(failure, natural_ending(node, failure))
         if is_settled(node, failure):
             ending = natural_ending(node, failure)
@@ -304,19 +304,17 @@ class Step:
         return failure_context(self._node, self._record)
 
     def _author_recovers(self, failure: Failure) -> bool:
-        node = self._node
-        return failure.route is not None and node.site.foresees(
+        return self._node.site.keeps_authors_way(
             failure.outcome, failure.route, failure.kind, self._record.settings
         )
 
-    def _tell_own_loop(self, failure: Failure) -> None:
+    def _tell_own_loop(self, outcome: str, route: Route) -> None:
         """Say, once in a trial, that the state keeps failing on the way that its author drew."""
         node, record = self._node, self._record
         if record.failure_class is not FailureClass.HIGH:
             return
         if node.records.history.keeps_failing(record.label):
-            target = cast('Route', failure.route).target  # by which the author recovers
-            node.warn_once('own loop', OWN_LOOP.format(failure.outcome, target), record.label)
+            node.warn_once('own loop', OWN_LOOP.format(outcome, route.target), record.label)
 
     # -- without the oracle
 

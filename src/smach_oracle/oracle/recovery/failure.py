@@ -121,7 +121,7 @@ def _judge(
         return Failure(
             label,
             FailureKind.EXCEPTION,
-            text=error_text(error),
+            text=_what_was_raised(error),
             error=_once(partial(raised_error, label, state, error)),
             details=traceback_of(error),
         )
@@ -155,6 +155,15 @@ def _judge(
     )
     unbound = _once(partial(smach.InvalidTransitionError, text))
     return Failure(label, kind, outcome, text, route, unbound)
+
+
+def _what_was_raised(error: BaseException) -> str:
+    """Return an error in words, with that of a branch by which a Concurrence raises."""
+    first = error
+    while isinstance(first, smach.InvalidStateError) and first.__cause__ is not None:
+        first = first.__cause__
+    text = error_text(error)
+    return text if first is error else '{} ({})'.format(text, error_text(first))
 
 
 def _ended_as_intended(state: smach.State) -> bool:

@@ -201,11 +201,10 @@ def _meaning(container: ContainerProspect, outcome: OutcomeProspect) -> str:
         return ''
     if not container.recovers:
         return 'failure'
-    return (
-        "failure, the author's own way is kept"
-        if outcome.author_recovers
-        else ('failure, the oracle takes it up')
-    )
+    if outcome.author_recovers:
+        return "failure, the author's own way is kept"
+    unless = ' unless child_termination_cb stops others' if outcome.may_stop_others else ''
+    return 'failure, the oracle takes it up' + unless
 
 
 def _aligned(rows: Sequence[Tuple[str, ...]]) -> List[str]:

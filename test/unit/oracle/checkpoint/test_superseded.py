@@ -136,7 +136,7 @@ def beside_last(diary, points):
         ['done'],
         ['done'],
         outcome_map={'succeeded': {'LEFT': 'succeeded', 'LAST': 'succeeded'}},
-        child_termination_cb=lambda outcomes: ended.set() or False,
+        child_termination_cb=lambda outcomes: outcomes['LEFT'] == 'succeeded' and ended.set(),
     )
     with both:
         smach.Concurrence.add('LEFT', Noted('LEFT', diary, points, failures=1))

@@ -60,13 +60,11 @@ class Turns:
         with self._changed:
             self._ended = dict.fromkeys(self._labels, False)
 
-    def branch_ended(self, outcomes: Dict[str, Optional[str]]) -> bool:
-        """Note which branches have an outcome. The others go on."""
+    def note_ended(self, running: Sequence[str]) -> None:
+        """Note which branches still run."""
         with self._changed:
-            for label, outcome in outcomes.items():
-                self._ended[label] = outcome is not None
+            self._ended = {label: label not in running for label in self._labels}
             self._changed.notify_all()
-        return False
 
     def wait(self, label: str, state: smach.State) -> None:
         """Wait until the branches before have ended, or until the state is preempted."""
@@ -215,9 +213,9 @@ def _concurrence(scene: Scene, box: Box, keys: Sequence[str]) -> smach.Concurren
         input_keys=list(keys),
         output_keys=list(keys),
         outcome_map={DONE: dict.fromkeys(labels, DONE)},
-        child_termination_cb=turns.branch_ended,
     )
     machine.register_start_cb(lambda ud, started: turns.begin())
+    machine.register_transition_cb(lambda ud, running: turns.note_ended(running))
     with machine:
         for leaf in box.children:
             state = WorkState(scene, leaf, _own_keys(scene, leaf, keys), '', turns)

@@ -42,7 +42,12 @@ class BranchPart(MachinePart):
     def author_recovers(self, failed: Failed) -> bool:
         """Whether the author of the parent has foreseen it."""
         own = self.settings_of(failed.label).author_recoveries
-        if failed.way is None or (own or self.run.plan.author_recoveries) == 'override':
+        if (own or self.run.plan.author_recoveries) == 'override':
+            return False
+        if isinstance(self.parent, ConcurrencePart) and failed.kind != 'TIME_LIMIT':
+            if self.parent.would_stop(self.label, failed.way and failed.outcome):
+                return True
+        if failed.way is None:
             return False
         if isinstance(self.parent, IteratorPart):
             plan = self.parent.plan

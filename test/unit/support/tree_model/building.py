@@ -184,7 +184,10 @@ class Parallel(smach.Concurrence):
         self._active = set()
         self.owed = set()
         self._has_preempted = False
-        self._child_termination_cb = self._branch_ended
+        self._noting = threading.Lock()
+        self.register_transition_cb(self._note_ends)
+        if stops_at:
+            self._child_termination_cb = self._stops
         if hasattr(self, '_done_cond'):
             self._done_cond = _Impatient(world)
 
@@ -229,12 +232,16 @@ class Parallel(smach.Concurrence):
         """Whether a preempt would reach the branches that run."""
         return not (self._has_preempted and hasattr(self, '_done_cond'))
 
-    def _branch_ended(self, outcomes: Any) -> bool:
-        stops = bool(self._stops_at & set(outcomes.values()))
-        ended = {label for label in self._active if outcomes.get(label) is not None}
-        for label in ended:
-            self._end(label, stops)
-        return stops
+    def _stops(self, outcomes: Any) -> bool:
+        return bool(self._stops_at & set(outcomes.values()))
+
+    def _note_ends(self, *_: Any) -> None:
+        """SMACH calls it as each branch begins and ends."""
+        outcomes = dict(self._child_outcomes)
+        with self._noting:
+            ended = {label for label in self._active if outcomes.get(label) is not None}
+            for label in ended:
+                self._end(label, self._stops(outcomes))
 
     def branch_raised(self, label: str) -> None:
         """A branch has raised: the others are preempted."""

@@ -224,6 +224,13 @@ class ConcurrencePart(Part):
         if set(self._outcomes.values()) & set(self.plan.stops_at):
             self._preempt_active()
 
+    def would_stop(self, label: str, outcome: Any) -> bool:
+        """Whether others that run would stop if a branch ended so; None: by an error."""
+        stops_at = set(self.plan.stops_at)
+        others_run = any(each != label for each in self._active)
+        stops = outcome is None or stops_at & {outcome, *self._outcomes.values()}
+        return bool(stops_at and others_run and stops)
+
     def request_preempt(self) -> None:
         self.flag = True
         self._preempt_active()
