@@ -17,6 +17,7 @@ from .machine.places import TreePlace
 from .machine.repeats import note_initial
 from .machine.tree_node import TreeNode, node_of
 from .records.events import EventKind
+from .recovery.stop import is_asked_around
 from .settings.names import PathPattern
 from .settings.settings import AUTONOMY_LEVELS
 from .smach_private import current_label_of, is_executing
@@ -213,6 +214,7 @@ class OperatorHand:
                     prospect.repeats,
                     tuple(written),
                     '' if sent is node else node.path,
+                    sent.machine.preempt_requested() or is_asked_around(sent),
                 ),
             )
         else:

@@ -195,3 +195,46 @@ def test_where_an_operator_sends_the_machine_on_the_oracle_recovers_again():
         held.hand.go_to('SM_ROOT', 'C')
         gate.opened.set()
         assert (held.end(), trail.ran) == ('done', ['A', 'B', 'CLEAN', 'C', 'C'])
+
+
+@pytest.mark.parametrize('preempt', [by_operator, by_script])
+@pytest.mark.parametrize('wait', [while_it_runs, while_asked])
+@pytest.mark.parametrize('around', [flat, nested, in_a_concurrence])
+def test_a_stop_goes_before_a_state_to_which_it_was_to_be_sent(around, wait, preempt):
+    trail = Trail()
+    works = Gate() if wait is while_it_runs else 'aborted'
+    inner = trail.cleaned(trail.state('A'), trail.state('B', works))
+
+    def sent_and_preempted(held):
+        held.hand.go_to(around(Trail(), Trail().cleaned())[1], 'A')
+        preempt(held)
+
+    held, has_run = stopped(trail, inner, around, wait, sent_and_preempted)
+    assert (held.end(), has_run) == ('preempted', ['A', 'B', 'CLEAN'])
+    assert not held.of(EventKind.SENT) and not held.hand.status().jumps
+    told = [event.text for event in held.of(EventKind.WARNING)]
+    assert 'is not sent to A: it was preempted since' in told
+
+
+@pytest.mark.parametrize('preempt', [by_operator, by_script])
+def test_it_does_so_where_the_machine_below_waits_before_a_state(preempt):
+    trail = Trail()
+    machine = trail.cleaned(trail.cleaned(), trail.state('LAST'), clean=trail.state('STOW'))
+    with Held(machine) as held:
+        at_a_confirmation(held, 'SM_ROOT/A')
+        held.hand.go_to('SM_ROOT', 'B')
+        preempt(held)
+        assert (held.end(), trail.ran) == ('preempted', ['A', 'CLEAN', 'STOW'])
+
+
+def test_what_is_asked_for_after_a_stop_is_done():
+    trail, gate = Trail(), Gate('preempted', heeds=False)
+    machine = works_on(trail, 'CLEAN')
+    machine._states['B'] = trail.state('B', gate)
+    with Held(machine) as held:
+        while_it_runs(held, 'SM_ROOT')
+        held.hand.preempt()
+        held.hand.go_to('SM_ROOT', 'C')
+        gate.opened.set()
+        held.end()
+    assert (len(held.of(EventKind.SENT)), trail.ran) == (1, ['A', 'B', 'C'])

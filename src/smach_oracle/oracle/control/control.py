@@ -90,6 +90,7 @@ class Jump(NamedTuple):
     """A state to which a container goes at its next state boundary.
 
     `container`: path of the container of the state. '' means it is the one that goes.
+    `after_stop`: whether a preempt stood as it was asked for. A later one goes before it.
     """
 
     state: str
@@ -98,6 +99,7 @@ class Jump(NamedTuple):
     repeats: Tuple[str, ...] = ()  # the guarded states of which it was confirmed that they repeat
     written: Tuple[str, ...] = ()  # userdata keys that were written for it
     container: str = ''
+    after_stop: bool = False
 
     def named(self) -> str:
         """Return the state, with the path of its container where that is another one."""

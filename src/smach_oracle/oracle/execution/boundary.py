@@ -125,7 +125,7 @@ def _pass(node: TreeNode, was_preempted: bool, is_drawn: bool) -> Optional[Stop]
     if not (stops or was_preempted):
         control.stop_is_over()
     jump = None if stops else control.take_jump(node.key)
-    if jump is not None and make_jump(node, jump):
+    if jump is not None and make_jump(node, jump, obeyed and not jump.after_stop):
         return Stop()  # to the next boundary, which is before that state
     place = HeldPlace(node.path, current_label_of(machine))
     autonomy = node.record(place.state).settings.autonomy

@@ -152,15 +152,17 @@ def _prospect_on(way: JumpPath, written: Tuple[str, ...]) -> Prospect:
     return Prospect('', missing_for(way, written), repeated_on(way))
 
 
-def make_jump(node: TreeNode, jump: Jump) -> bool:
+def make_jump(node: TreeNode, jump: Jump, is_stopped: bool) -> bool:
     """Make the jump that was asked for, and return whether it was made.
 
     To be called at a state boundary, with the machine's lock held where the engine holds it. What
     has come in between may prevent it. A warning tells so.
+
+    :param is_stopped: whether the machine has obeyed a preempt that came in between.
     """
     label = current_label_of(node.machine)
     way = jump_path_to(node, place_at(node, jump.container, jump.state))
-    why_not = _why_not(way, jump)
+    why_not = 'it was preempted since' if is_stopped else _why_not(way, jump)
     if why_not:
         node.warn('is not sent to {}: {}'.format(jump.named(), why_not), label)
         return False
