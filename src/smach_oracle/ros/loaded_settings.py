@@ -7,6 +7,7 @@ error learns where the key came from.
 """
 
 import importlib
+import os
 from typing import Any, Dict, Iterable, Iterator, List, Mapping, NamedTuple, Optional, Tuple, cast
 
 import rospy
@@ -101,6 +102,7 @@ def load_settings(
     param: Optional[str] = DEFAULT_PARAM,
     overrides: Optional[Mapping[str, Any]] = None,
     tells: bool = True,
+    folder: str = '',
 ) -> LoadedSettings:
     """Read and merge the settings.
 
@@ -108,18 +110,28 @@ def load_settings(
     :param param: a parameter that holds a mapping. Read only where this process is a ROS node.
     :param overrides: from the command line.
     :param tells: whether older keys of the file are warned of.
+    :param folder: where relative paths start, that of the file and those in it. '': where the
+        process is now.
     :raises SettingsError: naming file and line, or parameter, key, value and what is allowed.
     """
     settings = LoadedSettings()
     if path:
-        values, lines = read_yaml(path_of(path))
+        values, lines = read_yaml(os.path.join(folder, path_of(path)))
         settings.put(*in_groups(values, str(path), lines, tells))
+        _start_at(folder, settings)
     if param and rospy.core.is_initialized():
         settings.put(*read_param(param))
         settings.put(*read_checkpoint())
     if overrides:
         settings.put(*in_groups(overrides, 'command line'))
     return settings
+
+
+def _start_at(folder: str, settings: Dict[str, Any]) -> None:
+    """Have relative paths in settings, in groups, start at a folder."""
+    for group, key in ((settings, 'rates_file'), (settings.get('checkpoint', {}), 'file')):
+        if folder and isinstance(group.get(key), str) and group[key]:
+            group[key] = os.path.join(folder, path_of(group[key]))
 
 
 def in_groups(

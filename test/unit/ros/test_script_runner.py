@@ -329,3 +329,22 @@ def test_preconditions_can_be_named_in_the_script_itself(run, tmp_path):
         options=['--config', 'oracle.yaml'],
     )
     assert result.stdout == 'succeeded 1\n', result.stderr
+
+
+@pytest.mark.parametrize('options', [(), ('--check',)])
+def test_a_script_may_leave_the_folder_in_which_its_settings_are(run, tmp_path, options):
+    (tmp_path / 'elsewhere').mkdir()
+    (tmp_path / 'oracle.yaml').write_text('rates_file: rates.json\ncheckpoint: robot.db')
+    text = 'import os; os.chdir("elsewhere"); print(machine("aborted").execute())'
+    done = run(text, options=('--config', 'oracle.yaml', *options))
+    assert done.returncode == 0, done.stderr
+    assert not list((tmp_path / 'elsewhere').iterdir())
+    kept = {'rates.json', 'robot.db'} & {each.name for each in tmp_path.iterdir()}
+    assert len(kept) == (0 if options else 2)
+
+
+def test_an_error_names_the_settings_as_they_were_given(run, tmp_path):
+    (tmp_path / 'oracle.yaml').write_text('states: {POUR: {on_retry: never}}')
+    text = 'import os; os.chdir("/"); machine().execute()'
+    done = run(text, options=('--config', 'oracle.yaml'))
+    assert done.returncode == 2 and 'oracle_run: oracle.yaml line 1: states.POUR' in done.stderr

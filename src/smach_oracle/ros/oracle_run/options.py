@@ -182,6 +182,7 @@ class Invocation(NamedTuple):
     record_topics: Tuple[str, ...] = ()
     name: str = ''
     only_check: bool = False
+    folder: str = ''  # where the process began, which the script may leave
     of_wrapping: Sequence[str] = ()  # the options that a machine gets when it is wrapped
 
     @property
@@ -229,6 +230,7 @@ def parse(args: Sequence[str]) -> Invocation:
         tuple(given.record_topic),
         given.machine_name,
         given.check,
+        os.getcwd() if given.config else '',
         [each for each in _OPTIONS_OF_WRAPPING if each in _names_of(line.options)],
     )
 

@@ -78,7 +78,9 @@ def load(invocation: Invocation) -> LoadedSettings:
 
     :raises SettingsError: where the file cannot be read.
     """
-    return load_settings(invocation.config, overrides=invocation.overrides)
+    return load_settings(
+        invocation.config, overrides=invocation.overrides, folder=invocation.folder
+    )
 
 
 def read_settings(loaded: LoadedSettings) -> Settings:
