@@ -83,13 +83,22 @@ def _call(recovery: Recovery, spec: PreconditionSpec) -> None:
     try:
         result = node.tree.workers.call(spec.target, behind(gate), gate, settings, scope)
     except Exception as err:
-        raise NotMet('{} raised {}'.format(name, repr_of(err))) from err
+        raise NotMet('{} {}'.format(name, _raised(recovery, name, err))) from err
     if isinstance(result, Overrun):
         raise NotMet('{} {}'.format(name, result.text))
     if result is None:
         raise NotMet('{} returned None; True is met'.format(name))
     if not truth_of(result):
         raise NotMet('{} returned {}'.format(name, repr_of(result)))
+
+
+def _raised(recovery: Recovery, name: str, err: Exception) -> str:
+    """Return what a precondition raised. The log says so: it may be a mistake in a program."""
+    text = 'raised {}'.format(repr_of(err))
+    if recovery.scope.told is None:
+        place = '{}/{}'.format(recovery.node.path, recovery.record.label)
+        smach.logwarn('{}: precondition {} {}: it is not met'.format(place, name, text))
+    return text
 
 
 def _check_free(recovery: Recovery, target: object) -> None:
@@ -171,7 +180,7 @@ def _execute(
             return state.execute(view)
         return node.tree.workers.run(state, view, gate, label, settings)
     except Exception as err:
-        raise NotMet('raised {}'.format(repr_of(err))) from err
+        raise NotMet(_raised(recovery, label or type(state).__name__, err)) from err
     finally:
         node.tree.end_precondition(node, state)
         with origin.lock:
