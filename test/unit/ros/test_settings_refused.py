@@ -289,6 +289,23 @@ def test_a_precondition_that_fits_one_of_several_nested_machines_is_taken(run):
     assert (code, out.count('STATE RUNS')) == (0, 4), errors
 
 
+def test_a_precondition_that_is_a_state_of_another_container_is_told_by_its_path(run):
+    code, out, errors = run(
+        precondition('TWO', state='ONE/PICK'),
+        """
+        outer = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+        with outer:
+            smach.StateMachine.add('ONE', machine('PICK', 'AWAY'), {'succeeded': 'TWO'})
+            smach.StateMachine.add('TWO', machine('PLACE'))
+        outer.execute()
+    """,
+    )
+    assert code == 2 and errors.splitlines()[-1].endswith(
+        "'TWO' is not allowed (did you mean /TWO?); allowed: the labels of the other states "
+        'there: AWAY'
+    )
+
+
 def test_a_precondition_of_a_nested_state_is_looked_up_beside_it(run):
     code, out, errors = run(
         precondition('TWO', state='ONE/PICK'),

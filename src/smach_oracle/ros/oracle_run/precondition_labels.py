@@ -16,10 +16,21 @@ class _Use(NamedTuple):
     key: str
     named: str
     others: Tuple[str, ...]  # the labels that it may name there
+    place: str  # the path of the state that it is for
 
-    def names(self, paths: Set[str]) -> Set[str]:
-        """Return all that may be meant: those labels, or the paths of the machine."""
-        return paths | {'/' + each for each in paths} if '/' in self.named else set(self.others)
+    def hint(self, paths: Set[str]) -> str:
+        """Return ' (did you mean NAME?)', '' where nothing is close. `paths`: of the machine."""
+        if '/' in self.named:
+            return did_you_mean(self.named, paths | {'/' + each for each in paths})
+        elsewhere = [
+            each if '/' in each else '/' + each
+            for each in sorted(paths)
+            if each.rpartition('/')[2] == self.named
+            and not (self.place + '/').startswith(each + '/')
+        ]
+        if elsewhere:
+            return ' (did you mean {}?)'.format(' or '.join(elsewhere))
+        return did_you_mean(self.named, self.others)
 
 
 class SortedPreconditions(NamedTuple):
@@ -56,7 +67,7 @@ def _misplaced(use: _Use, paths: Set[str]) -> SettingsError:
         use.key,
         use.named,
         'the labels of the other states there: ' + ', '.join(use.others),
-        problem='is not allowed' + did_you_mean(use.named, use.names(paths)),
+        problem='is not allowed' + use.hint(paths),
     )
 
 
@@ -69,7 +80,7 @@ def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator
             for spec in settings.for_state(path, label).preconditions:
                 key = below if 'preconditions' in settings.states.get(below, ()) else label
                 for named in spec.labels():
-                    yield _Use('states.{}.preconditions'.format(key), named, others)
+                    yield _Use('states.{}.preconditions'.format(key), named, others, below)
         if settings.nested and isinstance(state, smach.Container):
             yield from _uses(state, settings, below)
 

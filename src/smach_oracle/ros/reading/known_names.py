@@ -64,7 +64,7 @@ class NameJudge:
             and not is_elsewhere
             and (is_here or not is_in_sources(unfit.name))
         ):
-            raise with_way_out(unfit)
+            raise unfit.error if is_here else with_way_out(unfit)
         if is_here or not is_elsewhere or unfit.kind is UnfitKind.MISPLACED:
             smach.logwarn('A machine of the script: {}'.format(unfit.error))
 
