@@ -20,7 +20,9 @@ def test_the_log_says_what_a_function_raised(log, is_check):
     assert machine.run() == 'done'
     assert [outcome for _, outcome in ends(machine)] == ['met' if is_check else 'not met']
     (told,) = warned(log)
-    assert told.startswith("SM_ROOT/B: precondition nothing_given raised TypeError('nothing_given()")
+    assert told.startswith(
+        "SM_ROOT/B: precondition nothing_given raised TypeError('nothing_given()"
+    )
     assert told.endswith(': it is not met')
 
 
