@@ -1,9 +1,9 @@
 """Settings of the executive from a YAML file, the parameter server and the command line.
 
 The parameter `~oracle` overrides the file, the command line overrides both. Mappings are merged key
-by key, everything else is replaced. Before that, each source is put in groups, so that a key
-overrides the same one under its older name. `smach_oracle.oracle` checks the values. Here every
-error learns where the key came from.
+by key, everything else is replaced. So is `on_no_answer`, and a policy by one of another name.
+Before that, each source is put in groups, so that a key overrides the same one under its older
+name. `smach_oracle.oracle` checks the values. Here every error learns where the key came from.
 """
 
 import importlib
@@ -246,10 +246,19 @@ def _merge_into(target: Dict[str, Any], values: Mapping[str, Any]) -> None:
     for key, value in values.items():
         if isinstance(value, Mapping):
             inner = target.get(key)
-            target[key] = dict(inner) if isinstance(inner, Mapping) else {}
+            if not isinstance(inner, Mapping) or _is_another(key, inner, value):
+                inner = {}
+            target[key] = dict(inner)
             _merge_into(target[key], value)
         else:
             target[key] = value
+
+
+def _is_another(key: str, before: Mapping[str, Any], now: Mapping[str, Any]) -> bool:
+    """Whether a mapping takes the place of one: a fallback, or a policy of another name."""
+    if key == 'policy':
+        return bool(now.get('name', before.get('name')) != before.get('name'))
+    return key == 'on_no_answer'
 
 
 def _dotted_keys(values: Mapping[str, Any], prefix: str = '') -> Iterator[str]:

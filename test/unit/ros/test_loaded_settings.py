@@ -280,3 +280,30 @@ def test_what_a_parameter_overrides_is_named():
             'states': {'PICK': {'prior': 0.3}},
         }
     ) == ['max_recoveries: 5, now 0', 'states.PICK.prior: 0.2, now 0.3']
+
+
+@pytest.mark.parametrize(
+    'before, now, both',
+    [
+        ('{name: ladder, wait_s: 1}', {'name': 'restart'}, {'name': 'restart'}),
+        ('{name: ladder, wait_s: 1}', {'tries': 2}, {'name': 'ladder', 'wait_s': 1, 'tries': 2}),
+        (
+            '{name: ladder, wait_s: 1}',
+            {'name': 'ladder', 'tries': 2},
+            {'name': 'ladder', 'wait_s': 1, 'tries': 2},
+        ),
+        ('ladder', {'name': 'ladder', 'tries': 2}, {'name': 'ladder', 'tries': 2}),
+    ],
+)
+def test_a_policy_of_another_name_takes_the_place_of_one(write, node, before, now, both):
+    node(oracle={'policy': now})
+    settings = load_settings(write('policy: {}'.format(before)))
+    assert settings['policy'] == both
+    assert Settings.from_dict(settings).policy == both['name']
+
+
+@pytest.mark.parametrize('key', ['on_no_answer: {}', 'expert: {{on_no_answer: {}}}'])
+def test_another_fallback_takes_the_place_of_one(write, node, key):
+    node(oracle={'expert': {'on_no_answer': {'give_up': 'parked'}}})
+    settings = load_settings(write(key.format('{goto: HOME}')))
+    assert settings['expert']['on_no_answer'] == {'give_up': 'parked'}
