@@ -44,7 +44,8 @@ def hand():
 
 
 def test_a_change_is_published_and_a_transition_only_where_anybody_listens(topic):
-    publisher = ControlPublisher(lambda: [('task', hand())])
+    shown = hand()
+    publisher = ControlPublisher(lambda: [('task', shown)])
     publisher.start()
     publisher.changed()
     assert wait_for(lambda: len(topic.messages) == 1)
