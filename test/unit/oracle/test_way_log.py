@@ -222,8 +222,8 @@ def test_an_error_that_ends_the_trial_says_that_the_way_has_not_helped():
     def broken(state, ud):
         raise ValueError('broken')
 
-    a = Scripted('ok', broken)
-    machine = machine_of(a, Scripted(*['aborted'] * 9), budget={'recoveries': 3})
+    a, b = Scripted('ok', broken), Scripted(*[ValueError('broken, too')] * 9)
+    machine = machine_of(a, b, budget={'recoveries': 3})
     with pytest.raises(smach.InvalidUserCodeError):
         machine.run()
     assert noted(machine, 'B')[-1] == ('from A', LATER, False)

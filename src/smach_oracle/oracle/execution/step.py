@@ -24,7 +24,14 @@ from ..records.events import EventKind, FailureKind
 from ..records.facts import LEFT, STOPPING, TAKEN_UP, UNCOUNTED
 from ..records.visits import VisitResult
 from ..recovery import occasions
-from ..recovery.failure import Announced, Failure, announced_by, judge, tell_failure
+from ..recovery.failure import (
+    Announced,
+    Failure,
+    announced_by,
+    judge,
+    tell_failure,
+    with_earlier_end,
+)
 from ..recovery.occasions import FirstStep, Occasion
 from ..recovery.phases import OracleState
 from ..recovery.recovery import Recovery
@@ -276,6 +283,7 @@ class Step:
             if node.tree.recover and failure.route is not None:
                 self._tell_own_loop(failure.outcome, failure.route)
             return self._end(failure, natural_ending(node, failure))
+        failure = with_earlier_end(node, failure)
         if is_settled(node, failure):
             ending = natural_ending(node, failure)
             if ending.state is None:

@@ -43,6 +43,7 @@ class Execution:
     runs_around: Tuple[Scope, ...] = ()
     departure: Optional[DeparturePort] = None
     unrecovered = False
+    failures = 0  # so far, without those that the author has foreseen
     starts_in = ''  # '': its initial state
     starts_below: Dict[int, str] = {}  # by the id of a node in the present state. Never written to
     _is_preempt_told = was_preempted = False
@@ -54,6 +55,7 @@ class Execution:
         """Begin once more, as an engine may do. What is around it stays."""
         self.departure = None
         self.unrecovered = False
+        self.failures = 0
         self.starts_in = ''
         self.starts_below = {}
         self._is_preempt_told = False
@@ -143,6 +145,7 @@ class Execution:
             why = why_no_outcome(outcome, error)
             node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=why)
         self.runs_around = ()
+        self.failures = 0
         node.records.drop_snapshots()
 
     def begin_branch(self, has_ended: bool) -> bool:

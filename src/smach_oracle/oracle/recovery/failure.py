@@ -7,7 +7,7 @@ failed, to REPORT, and REPORT leads to `failed`. Then the failure is that of WOR
 
 import traceback
 from functools import lru_cache, partial
-from typing import Callable, NamedTuple, Optional, Set, Tuple, Union, cast
+from typing import Callable, Dict, NamedTuple, Optional, Set, Tuple, Union, cast
 
 import smach
 from smach_common.foreign import error_text, repr_of
@@ -17,7 +17,7 @@ from ..decision.policy import FailureContext
 from ..machine.nesting import gave_up_in, items_under_way, nodes_in
 from ..machine.places import failure_context
 from ..machine.resumed import Unfinished
-from ..machine.site import Route, failure_kind, route_of
+from ..machine.site import Route, failure_kind, judged_at, route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
 from ..machine.workers import Overrun
@@ -39,6 +39,8 @@ class Failure(NamedTuple):
     # makes what the machine raises if the oracle gives up
     error: Optional[Callable[[], Exception]] = None
     details: str = ''  # the traceback
+    # where an earlier failure would have led, in place of what is raised
+    earlier_route: Optional[Route] = None
 
     @property
     def is_held_back(self) -> bool:
@@ -211,6 +213,33 @@ def _description(node: TreeNode, label: str, state: smach.State) -> str:
             '{}/{}: cannot say more of its failure: {}'.format(node.path, label, repr_of(err))
         )
         return ''
+
+
+def with_earlier_end(node: TreeNode, failure: Failure) -> Failure:
+    """Have a failure that raises end the container as an earlier one would have.
+
+    Without an oracle the container would have ended there. So it is in the same execution, as long
+    as the state of the earlier one has not succeeded since.
+
+    :param failure: its visit is the latest one. The author has not foreseen it.
+    """
+    node.execution.failures += 1
+    if failure.error is None or (failure.route is not None and failure.route.target):
+        return failure
+    visits = node.records.history.latest()
+    ends: Dict[str, Route] = {}
+    if not node.site.is_container:  # it has those of earlier items, too
+        visits = visits[-node.execution.failures :]
+    for visit in visits:
+        if visit.result in (VisitResult.SUCCESS, VisitResult.SUPERSEDED):
+            ends.pop(visit.state, None)
+        elif visit.result is VisitResult.FAILURE and node.has(visit.state):
+            route, kind = judged_at(node, visit.state, visit.outcome)
+            settings = node.settings_of(visit.state)
+            is_failure = bool(route.target) and kind is not FailureKind.NOT_A_FAILURE
+            if is_failure and not node.site.foresees(visit.outcome, route, kind, settings):
+                ends.setdefault(visit.state, route)
+    return failure._replace(earlier_route=next(iter(ends.values()), None))
 
 
 def in_words(failure: Failure) -> str:

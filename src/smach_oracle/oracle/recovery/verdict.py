@@ -188,11 +188,14 @@ def _ending_by(route: Route, obeys: bool = False) -> ContainerEnding:
 def natural_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     """Return how the failure would have ended the container without an oracle.
 
-    An overrun has no such ending, since the state would still run: the container's own failing
+    Where it raises, and an earlier failure would have ended the container, that ending counts. An
+    overrun has no such ending, since the state would still run: the container's own failing
     outcome, else an error.
     """
     if failure.route is not None and failure.route.target:
         return _ending_by(failure.route)
+    if failure.earlier_route is not None:
+        return _ending_by(failure.earlier_route)
     if failure.error is not None:
         return ContainerEnding(error=failure.error())
     outcome = failing_outcome(node, node.in_force.failing.first)

@@ -29,6 +29,9 @@ class MachinePart(Part, Recovering):
         self.work: Optional[Set[str]] = None
         self.left_with = ''
         self._natural: Optional[Way] = None  # ending, of the failure that is being recovered from
+        # of failures that the oracle has led elsewhere, by their states, which have not succeeded
+        # since
+        self._ends: Dict[str, Way] = {}
         self.begins_in: Optional[str] = None  # its next execution
 
     def children(self) -> List[Part]:
@@ -42,6 +45,7 @@ class MachinePart(Part, Recovering):
         self.settled = False
         self.ended_as_meant = False
         self._natural = None
+        self._ends.clear()
         self._preempted = None
         self.work = None
         self.snapshots.clear()
@@ -136,11 +140,14 @@ class MachinePart(Part, Recovering):
         reported = self._reported(label, outcome, failed)
         if reported is not None:
             self.memory.ended(label, SUCCESS)
+            self.forget_end(label)
             self.memory.reports(label)
             return (yield from self._recover_from(reported, reported.continuous))
         if failed is None:
             is_success = not self.flag and outcome != 'preempted'
             self.memory.ended(label, SUCCESS if is_success else PREEMPTED)
+            if is_success:
+                self.forget_end(label)
             way = self.way_of(label, outcome)
             self.tell('TRANSITION', label, outcome, way.target)
             self.ended_as_meant = is_success and self._is_meant(label, outcome)
@@ -171,10 +178,23 @@ class MachinePart(Part, Recovering):
         if self.author_recovers(failed):
             memory.keep_failure(self.run.plan.policy, label, failed.outcome, continuous)
             return self.end_naturally(failed)
+        self.note_end(failed)
+        if failed.ending is None:
+            failed = failed._replace(ending=next(iter(self._ends.values()), None))
         if self.child(label).settled:
             self.settled = failed.ending is None or not failed.ending.is_state
             return self.end_naturally(failed)
         return (yield from self._recover_from(failed, continuous))
+
+    def note_end(self, failed: Failed) -> None:
+        """Note how the container would have ended, for a later failure that raises."""
+        if failed.outcome and failed.way is not None and failed.way.target:
+            if failed.kind in ('FAILING_OUTCOME', 'FELL_THROUGH'):
+                self._ends.setdefault(failed.label, failed.way)
+
+    def forget_end(self, label: str) -> None:
+        """A state has succeeded, or an expert has done its work."""
+        self._ends.pop(label, None)
 
     def _recover_from(self, failed: Failed, continuous: bool) -> Course:
         self._natural = failed.ending

@@ -263,6 +263,7 @@ class Recovering:
             self.userdata.update(
                 {remapping.get(key, key): value for key, value in reply.outputs.items()}
             )
+            self.forget_end(label)
             if failed.kind == 'HELD_BACK':
                 self.memory.ended(label, 'superseded')
                 self.run.repeats.superseded((self.path, label))
@@ -380,6 +381,10 @@ class Recovering:
             return Way(goal.gives_up, False)
         if goal.failed is None:
             self.memory.ended(label, 'preempted')
+        else:
+            failed = self.failure_of(label, self.child(label).left_with, False)
+            if failed is not None and not self.author_recovers(failed):
+                self.note_end(failed)
         self.tell('TRANSITION', label, self.child(label).left_with, ORACLE)
         told = set(goal.repeats)
         if self.run.is_closed(goal) or (set(self.run.repeats.repeated_by(self, goal.label)) - told):
