@@ -14,24 +14,30 @@ __all__ = ['set_loggers', 'loginfo', 'logwarn', 'logerr', 'logdebug']
 Logger = Callable[[str], object]
 
 
+def _write(text: str) -> None:
+    """Write a whole line at once. Where standard output is closed (`>&-`), nothing is written."""
+    if sys.stdout is not None:
+        sys.stdout.write(text)
+
+
 def loginfo(msg: object) -> None:
     """Log an info message to standard output, by default."""
-    sys.stdout.write('[  INFO ] : %s\n' % (msg,))
+    _write('[  INFO ] : %s\n' % (msg,))
 
 
 def logwarn(msg: object) -> None:
     """Log a warning to standard output, by default."""
-    sys.stdout.write('[  WARN ] : %s\n' % (msg,))
+    _write('[  WARN ] : %s\n' % (msg,))
 
 
 def logdebug(msg: object) -> None:
     """Log a debug message to standard output, by default."""
-    sys.stdout.write('[ DEBUG ] : %s\n' % (msg,))
+    _write('[ DEBUG ] : %s\n' % (msg,))
 
 
 def logerr(msg: object) -> None:
     """Log an error to standard output, by default."""
-    sys.stdout.write('[ ERROR ] : %s\n' % (msg,))
+    _write('[ ERROR ] : %s\n' % (msg,))
 
 
 def set_loggers(info: Logger, warn: Logger, debug: Logger, error: Logger) -> None:

@@ -106,11 +106,12 @@ def run(module: str, *arguments: object, options: str = '') -> None:
         one alone.
     """
     asked = _asked(VERSION)
+    if asked is not None or module.startswith(PRINTING) or sys.argv[1:2] in HELP:
+        sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
     if asked is not None:
         sys.stdout.write('{} of smach_oracle {}\n'.format(asked, __version__))
+        sys.stdout.flush()
         return
-    if module.startswith(PRINTING) or sys.argv[1:2] in HELP:
-        sys.stdout, sys.stderr = _watched(sys.stdout), _watched(sys.stderr)
     only_help = options and _asked(*HELP) is not None
     try:
         if only_help:

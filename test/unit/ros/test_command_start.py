@@ -108,6 +108,8 @@ PRINTS = [
     'compare variants ' + ROWS,
     'learn {bags}',
     'learn --help',
+    'oracle_run --version',
+    'oracle_run --check examples/fetch_task.py',
 ]
 
 

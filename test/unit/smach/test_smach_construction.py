@@ -265,3 +265,11 @@ def test_a_sequence_goes_on_by_a_connector_outcome_that_is_registered_late():
     first.register_outcomes(['ok'])
     first.outcome = 'ok'
     assert sequence.execute() == 'other'
+
+
+def test_nothing_is_logged_where_standard_output_is_closed(monkeypatch):
+    from smach import log
+
+    monkeypatch.setattr('sys.stdout', None)
+    loggers = (log.loginfo, log.logwarn, log.logdebug, log.logerr)
+    assert [logger('nobody reads this') for logger in loggers] == [None] * 4

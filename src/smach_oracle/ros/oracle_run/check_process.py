@@ -24,8 +24,12 @@ def start(args: Sequence[str]) -> None:
     code = 'import sys; sys.path[:] = {!r}; from {} import main; main()'.format(
         list(sys.path), __name__
     )
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for number, stream in ((1, sys.stdout), (2, sys.stderr)):
+        if stream is None:  # it was closed (`>&-`): nothing is printed there
+            os.dup2(os.open(os.devnull, os.O_WRONLY), number)
+            os.set_inheritable(number, True)  # which dup2 leaves alone if it was free, and opened
+        else:
+            stream.flush()
     os.execv(sys.executable, [sys.executable, '-c', code] + list(args))
 
 

@@ -2,6 +2,7 @@
 
 import faulthandler
 import os
+import signal
 import sys
 import threading
 import time
@@ -143,10 +144,17 @@ class _ScriptWatch:
         self.names = CheckedNames()
 
     def tell(self, lines: Sequence[str]) -> None:
+        """Print lines of the report. Where that cannot be done, the process ends as others do."""
         with self._lock:
-            for line in lines:
-                self._stream.write(line + '\n')
-            self._stream.flush()
+            try:
+                for line in lines:
+                    self._stream.write(line + '\n')
+                self._stream.flush()
+            except BrokenPipeError:
+                self._leave(SIGNALLED + signal.SIGPIPE)
+            except OSError as err:
+                tell('output: {}'.format(err.strerror))
+                self._leave(USAGE_ERROR)
 
     def note(self, text: str) -> None:
         """Say something once."""

@@ -223,7 +223,7 @@ def _show_only_frames_of(file_name: str) -> None:
     sys.excepthook = excepthook
 
 
-def tell(err: Exception) -> None:
+def tell(err: object) -> None:
     """Say what is wrong, in a line for each thing."""
     for line in str(err).splitlines():
         print('oracle_run: {}'.format(line), file=sys.stderr, flush=True)
