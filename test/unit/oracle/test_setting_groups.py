@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from smach_oracle.oracle.errors import SettingsError
 from smach_oracle.oracle.execution.origin import origin_of
 from smach_oracle.oracle.settings.settings import GROUPS, Settings, StateSettings
+from smach_oracle.oracle.settings.written import WrittenFloat
 
 MOST_AT_THE_TOP = 28
 STORE = {
@@ -177,6 +178,8 @@ def test_short_and_empty_forms(values, same):
         ({'states': {'A': {'policy': 'prose'}}}, 'move it to the top of the settings'),
         ({'expert': {'deadline_s': -1}}, 'expert.deadline_s: -1 is not allowed'),
         ({'deadline_s': -1}, 'deadline_s: -1 is not allowed'),
+        ({'expert': {'deadline_s': WrittenFloat('nan')}}, 'expert.deadline_s: nan is not allowed'),
+        ({'cost': {'harm': WrittenFloat('nan')}}, 'cost.harm: nan is not allowed'),
         ({'checkpoint': {'file': 5}}, 'checkpoint.file: 5 is not allowed'),
         ({'healthy': {'conditions': [{'topic': 3}]}}, 'healthy.conditions[0].topic: 3'),
         ({'healthy': [{'topic': 3}]}, 'healthy[0].topic: 3'),
