@@ -1,8 +1,8 @@
 """Draw the figures of an experiment, and write its tables, from the rows that it has kept.
 
 FOLDER is that of `run_trials --protocol`, or one with its results.csv files below it. No bag is
-needed. The folder OUT gets main.svg, same_seeds.svg, persistence.svg, memory.svg, continuous.svg,
-extra.svg, each with a PNG, and tables.md, as far as there are rows of them.
+needed. The folder of --output gets main.svg, same_seeds.svg, persistence.svg, memory.svg,
+continuous.svg, extra.svg, each with a PNG, and tables.md, as far as there are rows of them.
 """
 
 import argparse
