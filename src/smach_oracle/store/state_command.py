@@ -197,11 +197,18 @@ def _edit(given: argparse.Namespace) -> None:
         path = given.container or stopped.trial.machine
         keys = stopped.keys(path)
         stopped.edit(key, text, path, _user_name())
+        is_under_way = stopped.is_under_way(path)
     _say(
         '{} is changed'.format(key)
         if key in keys
         else '{} is new: {} had {}'.format(key, path, ', '.join(keys) or 'no key')
     )
+    if not is_under_way:
+        _say(
+            '{} is not under way: as it begins, its input keys get the values of {}'.format(
+                path, path.rpartition('/')[0]
+            )
+        )
 
 
 def _go_to(given: argparse.Namespace) -> None:

@@ -129,6 +129,10 @@ class StoppedTrial:
             }
         )
 
+    def is_under_way(self, path: str) -> bool:
+        """Whether a container was under way. Any other one gets its input keys as it begins."""
+        return self._is_in_state_under_way(path, self._place_facts())
+
     def is_kept(self) -> bool:
         """Whether its program ended as nobody had said how it goes on."""
         return self._last_kind() == KEPT

@@ -319,3 +319,14 @@ def test_a_key_that_is_new_is_said_to_be(killed, capsys):
     assert told(capsys, killed.store, 'edit', 'file=1') == 'file is changed\n'
     assert told(capsys, killed.store, 'edit', 'don=["A"]') == ('don is new: TOP had done, file\n')
     assert told(capsys, killed.store, 'edit', 'don=["B"]') == 'don is changed\n'
+
+
+def test_an_edit_of_a_container_that_will_begin_says_what_its_input_keys_get(killed, capsys):
+    edit = ('edit', 'done=["by hand"]', '--container', 'TOP/XY')
+    assert told(capsys, killed.store, *edit) == 'done is changed\n'
+    told(capsys, killed.store, 'goto', 'XY/Y')
+    assert told(capsys, killed.store, *edit) == (
+        'done is changed\n'
+        'TOP/XY is not under way: as it begins, its input keys get the values of TOP\n'
+    )
+    assert killed.run()['done'] == ['A', 'Y']
