@@ -20,7 +20,7 @@ from . import table
 from .bag_events import BagError
 from .comparing.groups import BY, TrialGroup, groups_by
 from .counting.trial_summary import TrialSummary
-from .reading import report_error, report_skipped
+from .reading import report_error, report_skipped, rule_of
 from .trials import Trials, load_by_state, load_trials
 from .variants import VariantCounts, count_variants, time_series
 
@@ -38,8 +38,7 @@ def main(argv: Optional[Sequence[str]] = None) -> int:
     """Run the command, and return its exit code."""
     args = _parse(argv)
     try:
-        listed = args.failing_outcomes
-        rule = FailureRule(tuple(listed)) if listed else None
+        rule = rule_of('bag_statistics', args.failing_outcomes)
         with contextlib.ExitStack() as closing:
             cluster = (
                 closing.enter_context(WorkerCluster(args.scheduler, args.without_tls))

@@ -4,9 +4,11 @@ A bag that cannot be used is skipped and named, and the exit code is 1.
 """
 
 import json
+import os
 import sys
-from typing import Dict, Iterator, List, Mapping, Sequence, Tuple, Union
+from typing import Dict, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
+from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.packages import lacking
 
 from .bag_events import BagContent, BagError, EventReader, SkippedBag, find_bags
@@ -52,6 +54,18 @@ def report_skipped(skipped: Sequence[SkippedBag]) -> int:
     for item in skipped:
         sys.stderr.write('Skipped {}: {}\n'.format(item.path, item.reason))
     return SOME_SKIPPED if skipped else ALL_READ
+
+
+def rule_of(command: str, names: Optional[Sequence[str]]) -> Optional[FailureRule]:
+    """Return the rule that --failing-outcomes gives, None where it is not given.
+
+    A folder behind the option is one of its names. A line on standard error says so.
+    """
+    for name in names or ():
+        if os.path.exists(name):
+            text = "{}: --failing-outcomes: '{}' is taken as an outcome; give folders before it\n"
+            sys.stderr.write(text.format(command, name))
+    return FailureRule(tuple(names)) if names else None
 
 
 def plain(skipped: Sequence[SkippedBag]) -> List[Dict[str, str]]:

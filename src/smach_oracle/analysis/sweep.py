@@ -13,12 +13,11 @@ import os
 import sys
 from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-from smach_oracle.oracle.settings.failure_rule import FailureRule
 from smach_oracle.oracle.settings.paths import path_of
 
 from .bag_events import BagError
 from .compare_command.inputs import instead_of_bags
-from .reading import report_error, report_skipped
+from .reading import report_error, report_skipped, rule_of
 from .table import over_replicates, percent
 from .trial_counter import PERSON_NEEDED
 from .trials import load_trials
@@ -207,8 +206,7 @@ def main(argv: Optional[Sequence[str]] = None, command: str = 'compare oracles')
     )
     args = parser.parse_args(argv)
     try:
-        listed = args.failing_outcomes
-        found = load_trials(args.folders, FailureRule(tuple(listed)) if listed else None)
+        found = load_trials(args.folders, rule_of(command, args.failing_outcomes))
         code = report_skipped(found.skipped)
         points = find_points(find_variants(found.trials))
         if not points:

@@ -237,3 +237,17 @@ def test_the_command_counts_300_bags_in_seconds(both_variants):
     )
     assert run.returncode == 0 and 'PICK_AND_PLACE' in run.stdout
     assert time.monotonic() - began < 20.0  # half a second on an idle machine
+
+
+@pytest.mark.parametrize('command', [bag_statistics, sweep])
+def test_a_folder_that_is_taken_as_a_failing_outcome_is_told(both_variants, capsys, command):
+    folders = [str(both_variants / each) for each in ('with_oracle', 'without_oracle')]
+    command.main([folders[0], '--failing-outcomes', 'aborted', folders[1]])
+    name = 'bag_statistics' if command is bag_statistics else 'compare oracles'
+    assert capsys.readouterr().err == (
+        "{}: --failing-outcomes: '{}' is taken as an outcome; give folders before it\n".format(
+            name, folders[1]
+        )
+    )
+    command.main([*folders, '--failing-outcomes', 'aborted'])
+    assert capsys.readouterr().err == ''
