@@ -46,6 +46,7 @@ class Concurrence(Container):
         self._outcome_cb = outcome_cb
         self._child_termination_cb = child_termination_cb
         self._run: Optional[ParallelRun] = None  # while it executes
+        self._child_outcomes: Outcomes = {}  # so far, while it executes. Subclasses write it, too
         # A preempt nobody serviced stays visible to the parent after the run, but it is not meant
         # for the next run.
         self._preempt_is_over = False
@@ -142,7 +143,7 @@ class Concurrence(Container):
             self._child_began,
             self._child_ended,
         )
-        self._run = run
+        self._run, self._child_outcomes = run, run.outcomes
         if self._preempt_is_over:
             self._preempt_is_over = False
             self._preempt_requested = False
@@ -151,7 +152,7 @@ class Concurrence(Container):
                 run.preempt()
             run.run()
         finally:
-            self._run = None
+            self._run, self._child_outcomes = None, {}
             self._preempt_is_over = self._preempt_requested
         return run
 
@@ -280,12 +281,6 @@ class Concurrence(Container):
         if userdata is not None:
             self.userdata.update(userdata)
 
-    @property
-    def _child_outcomes(self) -> Outcomes:
-        """Upstream's name for the outcomes so far of an execution under way."""
-        run = self._run
-        return {} if run is None else run.outcomes
-
     def get_active_states(self) -> List[str]:
         """Return the labels of the children that are running."""
         run = self._run
@@ -302,7 +297,7 @@ class Concurrence(Container):
     # -- copies
 
     def __getstate__(self) -> Dict[str, Any]:
-        return dict(self.__dict__, _run=None)
+        return dict(self.__dict__, _run=None, _child_outcomes={})
 
 
 def _entries(conditions: Any) -> List[Tuple[Any, Any]]:

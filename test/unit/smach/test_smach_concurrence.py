@@ -401,3 +401,28 @@ def test_ctrl_c_stops_a_concurrence_in_a_machine_at_once():
     finally:
         process.kill()
     assert 'interrupted False False' in rest and time.monotonic() - begin < 10.0
+
+
+def test_a_subclass_may_keep_the_outcomes_so_far_by_upstreams_name_for_them():
+    class OneByOne(smach.Concurrence):
+        def execute(self, parent_ud=None):
+            self._child_outcomes = {}
+            for label, state in self.get_children().items():
+                self._child_outcomes[label] = state.execute(self.userdata)
+            return 'succeeded' if self._child_outcomes == {'A': 'done', 'B': 'done'} else 'failed'
+
+    one_by_one = OneByOne(['succeeded', 'failed'], 'failed')
+    with one_by_one:
+        smach.Concurrence.add('A', Fixed())
+        smach.Concurrence.add('B', Fixed())
+    assert one_by_one.execute() == 'succeeded'
+
+
+def test_the_outcomes_so_far_are_there_while_it_executes():
+    told = []
+    both = concurrence(
+        {'A': Fixed(), 'B': Fixed()},
+        child_termination_cb=lambda outcomes: told.append(dict(both._child_outcomes)),
+    )
+    both.execute()
+    assert told[-1] == {'A': 'done', 'B': 'done'} and not both._child_outcomes
