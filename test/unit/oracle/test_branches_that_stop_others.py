@@ -5,7 +5,15 @@ import threading
 
 import pytest
 from branch_machines import both, inside
-from machines import FakeExpert, Gate, Scripted, Watched, chain_of, give_up
+from machines import (
+    FakeExpert,
+    Gate,
+    Scripted,
+    Watched,
+    chain_of,
+    give_up,
+    in_thread,
+)
 
 import smach
 from smach_oracle.oracle.records.events import EventKind, FailureKind
@@ -208,6 +216,36 @@ def test_a_callback_that_raises_raises_as_without_an_oracle():
     assert machine.run() == 'done'
     assert (bumper.runs, drive.runs) == (2, 2)
     assert decisions(machine) == [('TOP', 'ALL')]
+
+
+@UPSTREAMS_WAY
+def test_a_callback_that_would_end_the_program_raises_as_without_an_oracle():
+    def ends(ended):
+        if ended['LEFT'] == 'aborted':
+            raise SystemExit(3)
+        return False
+
+    bumper, drive, concurrence = beside('aborted', child_termination_cb=ends)
+    machine = watched(concurrence)
+    assert machine.run() == 'done'
+    assert (bumper.runs, drive.runs) == (2, 2)
+
+
+def test_callbacks_of_two_branches_that_fail_at_once_may_preempt_them_all():
+    """In the callback of one the other one is preempted, while it is in its own."""
+    both_ask = threading.Barrier(2)
+
+    def ends(ended):
+        if 'aborted' in ended.values() and not concurrence.preempt_requested():
+            both_ask.wait(20)
+            concurrence.request_preempt()
+        return False
+
+    concurrence = both(
+        Scripted('aborted'), Scripted('aborted'), outcome_map={}, child_termination_cb=ends
+    )
+    machine = watched(concurrence)
+    assert in_thread(machine.run).result()
 
 
 def test_an_overrun_is_recovered_in_its_place():

@@ -9,11 +9,13 @@ from ..asking.question import OutcomeChoice
 from ..identity import attribute_of
 from ..machine.site import Route, Site, judged_at, leads_to_next_item
 from ..machine.tree_node import TreeNode
+from ..machine.workers import recall_preempts
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import (
     child_termination_cb_of,
     final_outcomes_of,
+    lock_of,
     outcome_map_of,
     outcomes_so_far,
     states_of,
@@ -99,12 +101,19 @@ class BranchSite(Site):
         if outcome is None or not running:
             return bool(running)
         callback: Any = child_termination_cb_of(self.container)
+        branch = self._node.machine
+        lock = lock_of(branch)
+        lock.release()  # the callback may preempt the branches
         try:
             stopped = callback(outcomes)
             is_list = isinstance(stopped, (list, tuple, set, frozenset))
             return not running.isdisjoint(stopped) if is_list else bool(stopped)
-        except Exception:  # it raises once the branch has ended, and that stops them
+        except BaseException:  # it raises once the branch has ended, and that stops them
             return True
+        finally:
+            lock.acquire()
+            if branch.preempt_requested():  # the request has come after the end of the state
+                recall_preempts(states_of(branch)[self.label])
 
     def shown_route(self, route: Route, outcome: str) -> Route:
         """Say where an outcome leads, for people."""
