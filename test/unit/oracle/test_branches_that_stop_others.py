@@ -7,6 +7,7 @@ import pytest
 from branch_machines import both, inside
 from machines import (
     FakeExpert,
+    FakeHealth,
     Gate,
     Scripted,
     Watched,
@@ -246,6 +247,32 @@ def test_callbacks_of_two_branches_that_fail_at_once_may_preempt_them_all():
     )
     machine = watched(concurrence)
     assert in_thread(machine.run).result()
+
+
+def test_they_stop_before_anybody_looks_whether_the_robot_is_well():
+    health, asked = FakeHealth(), []
+    drives = Gate()
+
+    def stops(state, ud):
+        outcome = drives(state, ud)
+        asked.append(health.asked)
+        return outcome
+
+    bumper, drive = Bumper(drives, 'aborted'), Scripted(stops)
+    machine = watched(both(bumper, drive, **BY_FAILURE), health=health)
+    assert machine.run() == 'done'
+    assert asked == [0] and health.asked
+    assert failures(machine) == [('TOP/ALL', 'LEFT'), ('TOP', 'ALL')]
+
+
+def test_the_level_above_counts_no_failure_of_a_robot_that_is_not_well():
+    health = FakeHealth('the motors are off')
+    bumper, drive, concurrence = beside('aborted', **BY_FAILURE)
+    machine = watched(concurrence, health=health, settings={'healthy': {'settle_s': 0.01}})
+    assert machine.run() == 'done'
+    assert (bumper.runs, drive.runs) == (2, 2)
+    assert failures(machine) == [('TOP/ALL', 'LEFT')]
+    assert machine.of(EventKind.HEALTH_WAIT_END)
 
 
 def test_an_overrun_is_recovered_in_its_place():

@@ -148,11 +148,16 @@ class Step:
         if stopping:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_preempted(judged)
-        if node.tree.recover and node.tree.health.is_set:
+        keeps_way = node.tree.recover and self._author_recovers(judged)
+        at_once = keeps_way and node.site.may_stop_others(record.settings)
+        why = None
+        if node.tree.recover and node.tree.health.is_set and not at_once:
             why = self._why_unwell()
-            if why is not None:
-                return self._failed_unwell(judged, why)
-        return self._failed(judged)
+        if node.execution.is_left_behind():
+            return stop_left_behind(node)
+        if why is not None:
+            return self._failed_unwell(judged, keeps_way, why)
+        return self._failed(judged, keeps_way)
 
     # -- why the oracle is entered
 
@@ -244,29 +249,32 @@ class Step:
             lock.acquire()
         return '' if scope.reason is not None else why or None
 
-    def _failed_unwell(self, failure: Failure, why: str) -> Union[Occasion, Stop]:
+    def _failed_unwell(self, failure: Failure, keeps_way: bool, why: str) -> Union[Occasion, Stop]:
         """Go on after a failure while the robot was not well: it is not counted.
 
         Such a visit is no visit: it is in no history, no rate and no count, and the observers are
         told of no failure, transition or jump. They are told that the machine waits.
 
-        `why`: see `_why_unwell`.
+        `keeps_way`: see `_failed`. `why`: see `_why_unwell`.
         """
         node, record = self._node, self._record
-        if node.execution.is_left_behind():
-            return stop_left_behind(node)
-        if self._author_recovers(failure):
+        if keeps_way:
             if not why:
                 node.records.visit_ended(record, failure.outcome, VisitResult.PREEMPTED)
             return self._end(failure, natural_ending(node, failure), UNCOUNTED if why else NO_FACTS)
         if why and record.unwell_repeats >= record.most_repeats:
-            return self._failed(failure, why)
+            return self._failed(failure, keeps_way, why)
         if not why:  # a request came after the state's end: the meta state services it
             recall_preempts(states_of(self._machine)[record.label])
         return occasions.unwell(failure, self._context(), why)
 
-    def _failed(self, failure: Failure, why_unwell: str = '') -> Union[Occasion, Stop]:
-        """Count the failure and recover from it. `why_unwell`: the robot is not well."""
+    def _failed(
+        self, failure: Failure, keeps_way: bool, why_unwell: str = ''
+    ) -> Union[Occasion, Stop]:
+        """Count the failure and recover from it.
+
+        `keeps_way`: it goes as its author drew it. `why_unwell`: the robot is not well.
+        """
         node, record = self._node, self._record
         state = states_of(self._machine)[record.label]
         if node.tree.recover and isinstance(state, smach.Container):
@@ -278,7 +286,7 @@ class Step:
         record.learn(True)
         record.last_failure = failure.kind, failure.outcome, failure.text
         node.records.visit_ended(record, failure.outcome, VisitResult.FAILURE)
-        if not node.tree.recover or self._author_recovers(failure):
+        if not node.tree.recover or keeps_way:
             node.site.tell_item_passed_over(failure.state, failure.outcome)
             if node.tree.recover and failure.route is not None:
                 self._tell_own_loop(failure.outcome, failure.route)
