@@ -41,7 +41,7 @@ from .nesting import children_of, nodes_of
 from .repeats import repeated_by_going_to, why_closed
 from .state_record import StateRecord
 from .tree_node import TreeNode
-from .userdata import UserdataGate, WriteWatch, missing_keys
+from .userdata import UserdataGate, WriteWatch, keys_that_stay, missing_keys
 
 
 class ContainerLink(NamedTuple):
@@ -365,7 +365,8 @@ def _keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tu
     snapshot = node.record(label).snapshot
     if node.in_force.userdata == KEEP or snapshot is None:
         return tuple(now)
-    return tuple(set(snapshot).difference(written).union(key for key in written if key in now))
+    stay = keys_that_stay(node.machine, node.in_force.deep_copy_keys).union(written)
+    return tuple(set(snapshot).difference(stay).union(key for key in stay if key in now))
 
 
 def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:

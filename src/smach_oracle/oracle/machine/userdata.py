@@ -316,6 +316,21 @@ def _has_plain_keys(state: smach.State) -> bool:
     )
 
 
+def keys_that_stay(machine: smach.StateMachine, deep_copy_keys: Iterable[str]) -> Set[str]:
+    """Return the userdata keys that are there, and that no state of the machine may change.
+
+    Another part of the program writes them, such as a callback that asks the machine to stop.
+    """
+    if own_mark(machine, 'hands_on_userdata'):
+        return set()
+    written = set(deep_copy_keys)
+    for label, state in list(states_of(machine).items()):
+        remapping = remapping_of(machine, label)
+        written.update(remapping.get(key, key) for key in state.get_registered_output_keys())
+        written.update(constants_of(machine, label))
+    return set(data_of(machine.userdata)).difference(written)
+
+
 def missing_keys(
     machine: smach.StateMachine, label: str, available: Iterable[str]
 ) -> Tuple[str, ...]:

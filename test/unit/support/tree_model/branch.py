@@ -69,6 +69,9 @@ class BranchPart(MachinePart):
     def restores(self, target: str) -> bool:
         return not isinstance(self.parent, ConcurrencePart) and super().restores(target)
 
+    def keys_of_states(self) -> Set[str]:
+        return set(self.userdata)  # an item's state has all of them in its hands
+
     def holds_paths(self) -> bool:
         return False  # its path is that of the parent
 

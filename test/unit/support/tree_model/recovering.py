@@ -329,8 +329,21 @@ class Recovering:
         """The userdata that a jump to a state leaves."""
         if not self.restores(target):
             return dict(self.userdata)
-        survives = {key: value for key, value in self.userdata.items() if key in written}
+        changed = self.keys_of_states()
+        survives = {
+            key: value
+            for key, value in self.userdata.items()
+            if key in written or key not in changed
+        }
         return {**self.snapshots[target], **survives}
+
+    def keys_of_states(self: Any) -> Set[str]:
+        """The keys of this container that its states may change."""
+        found: Set[str] = set()
+        for part in self.children():
+            remapping = self.plan.remappings.get(part.label, {})
+            found.update(remapping.get(key, key) for key in getattr(part.plan, 'writes', part.keys))
+        return found
 
     def missing(self: Any, label: str) -> Tuple[str, ...]:
         """Input keys of a state that are not there."""
