@@ -83,13 +83,13 @@ def draw(seed: object) -> Tree:
     """The tree of that seed."""
     drawing = _Drawing(str(seed))
     top = drawing.line(TOP, 3, 'machine')
-    return Tree(str(seed), top, dict(_walk(TOP, top)))
+    return Tree(str(seed), top, dict(walk(TOP, top)))
 
 
-def _walk(path: str, node: Node) -> Iterator[Tuple[str, Node]]:
+def walk(path: str, node: Node) -> Iterator[Tuple[str, Node]]:
     yield path, node
     for child in node.children:
-        yield from _walk('{}/{}'.format(path, child.label), child)
+        yield from walk('{}/{}'.format(path, child.label), child)
 
 
 class _Drawing:

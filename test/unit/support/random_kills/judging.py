@@ -152,7 +152,10 @@ class Judge:
             self._say(line, 'a number is used twice, or is smaller than one before')
         self._last_seq = line['seq']
         if kind == 'STATE_START':
-            self._starts(line, path)
+            self._goes_on(line, path)
+        if kind == 'CONTAINER_END' and line['path'] in self._tree.nodes:
+            for child in self._tree.nodes[line['path']].children:
+                self._goes_on(line, path + child.label)
         if kind == 'FAILURE' and line['failure'] == FailureKind.INTERRUPTED:
             self._in_doubt(line, path)
         if kind in ('DECISION', 'JUMP') and line['target']:
@@ -188,8 +191,8 @@ class Judge:
         elif line['last_seq'] < self._promised:
             self._say(line, 'event {} was promised'.format(self._promised))
 
-    def _starts(self, line: Line, path: str) -> None:
-        """A visit begins: the one before, which ended in a killed process, was not in doubt."""
+    def _goes_on(self, line: Line, path: str) -> None:
+        """A visit begins, or its container ends: the one before is in doubt no more."""
         visits = self._visits.get((path, self._latest.get(path, ())))
         if visits is not None and visits.phase == 'ended' and visits.run != line['run']:
             visits.phase = 'over'
