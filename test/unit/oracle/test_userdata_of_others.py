@@ -32,7 +32,8 @@ def run(machine, drive, seen, **wrap):
 def test_a_state_that_is_tried_again_sees_that_it_is_to_stop(begins_with):
     drive, seen = Scripted(**INPUT), []
     machine = chain_of(drive)
-    machine.userdata.update(begins_with)
+    for key, value in begins_with.items():
+        machine.userdata[key] = value
     run(machine, drive, seen)
     assert seen == [True] and machine.userdata.stop is True
 
