@@ -23,7 +23,7 @@ from ..machine.places import (
 )
 from ..machine.repeats import leave_for, why_closed
 from ..machine.tree_node import TreeNode
-from ..machine.userdata import keys_that_stay, missing_keys, restore
+from ..machine.userdata import keys_of_others, missing_keys, restore
 from ..records.events import EventKind
 from ..smach_private import current_label_of, data_of, is_executing, remapping_of
 from .transitions import go_to
@@ -45,7 +45,7 @@ def prepare_entry(way: JumpPath, written: Collection[str], sent: str) -> Dict[st
     snapshot = node.record(target).snapshot if node.in_force.userdata == RESTORE else None
     if snapshot is not None:
         deep = node.in_force.deep_copy_keys
-        stay = keys_that_stay(node.machine, deep).union(written)
+        stay = keys_of_others(node.machine, snapshot, deep).union(written)
         restore(data_of(node.machine.userdata), snapshot, stay, deep)
     leave_for(node, target, way.entered_places[1:])
     for place in way.entered_places:

@@ -41,7 +41,7 @@ from .nesting import children_of, nodes_of
 from .repeats import repeated_by_going_to, why_closed
 from .state_record import StateRecord
 from .tree_node import TreeNode
-from .userdata import UserdataGate, WriteWatch, keys_that_stay, missing_keys
+from .userdata import UserdataGate, WriteWatch, keys_of_others, missing_keys
 
 
 class ContainerLink(NamedTuple):
@@ -365,7 +365,8 @@ def _keys_after_jump(node: TreeNode, label: str, written: Collection[str]) -> Tu
     snapshot = node.record(label).snapshot
     if node.in_force.userdata == KEEP or snapshot is None:
         return tuple(now)
-    stay = keys_that_stay(node.machine, node.in_force.deep_copy_keys).union(written)
+    others = keys_of_others(node.machine, snapshot, node.in_force.deep_copy_keys)
+    stay = others.union(written)
     return tuple(set(snapshot).difference(stay).union(key for key in stay if key in now))
 
 

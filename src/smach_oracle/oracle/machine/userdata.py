@@ -316,19 +316,26 @@ def _has_plain_keys(state: smach.State) -> bool:
     )
 
 
-def keys_that_stay(machine: smach.StateMachine, deep_copy_keys: Iterable[str]) -> Set[str]:
-    """Return the userdata keys that are there, and that no state of the machine may change.
+def keys_of_others(
+    machine: smach.StateMachine, snapshot: Mapping[str, object], deep_copy_keys: Iterable[str]
+) -> Set[str]:
+    """Return the userdata keys that have changed since, and that no state of the machine writes.
 
-    Another part of the program writes them, such as a callback that asks the machine to stop.
+    Another part of the program does, such as a callback that asks the machine to stop.
     """
-    if own_mark(machine, 'hands_on_userdata'):
+    none = object()
+    now = data_of(machine.userdata)
+    changed = {key for key in now if now[key] is not snapshot.get(key, none)}
+    changed.difference_update(deep_copy_keys)
+    if not changed or own_mark(machine, 'hands_on_userdata'):
         return set()
-    written = set(deep_copy_keys)
     for label, state in list(states_of(machine).items()):
         remapping = remapping_of(machine, label)
-        written.update(remapping.get(key, key) for key in state.get_registered_output_keys())
-        written.update(constants_of(machine, label))
-    return set(data_of(machine.userdata)).difference(written)
+        changed.difference_update(
+            [remapping.get(key, key) for key in state.get_registered_output_keys()],
+            constants_of(machine, label),
+        )
+    return changed
 
 
 def missing_keys(
