@@ -37,7 +37,7 @@ from ..recovery.phases import OracleState
 from ..recovery.recovery import Recovery
 from ..recovery.stack_room import too_deep_below, too_deep_here
 from ..recovery.still_running import EndedByAnswer
-from ..recovery.stop import note_end_under_preempt, winds_down
+from ..recovery.stop import note_end_under_preempt, note_stop_of_part, winds_down
 from ..recovery.verdict import (
     ContainerEnding,
     Departure,
@@ -125,7 +125,12 @@ class Step:
             note_end_under_preempt(
                 node, record.label, outcome if isinstance(judged, Route) else None
             )
-        announced = None if stopping else announced_by(node, record, outcome, judged)
+        is_part = (
+            not (stopping or isinstance(outcome, Overrun))  # which the oracle has asked to stop
+            and (isinstance(judged, Failure) or is_preempted(outcome))
+            and note_stop_of_part(node, record.label)
+        )
+        announced = None if stopping or is_part else announced_by(node, record, outcome, judged)
         if announced is not None:
             return self._announced(outcome, announced)
         if isinstance(judged, Route):
@@ -145,7 +150,7 @@ class Step:
         stopping = stopping or winds_down(node)
         if judged.is_held_back:
             return self._held_back(judged, stopping)
-        if stopping:
+        if stopping or is_part:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_preempted(judged)
         keeps_way = node.tree.recover and self._author_recovers(judged)

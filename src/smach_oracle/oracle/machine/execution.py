@@ -33,7 +33,8 @@ class Execution:
 
     `runs_around`: the watched executions inside which it takes place. `departure`: the verdict from
     below, or from here, that ends the present state. `unrecovered`: whether the oracle has given
-    up, and so ended it. `was_preempted`: whether a preempt was told of it.
+    up, and so ended it. `was_preempted`: whether a preempt was told of it. `was_stopped`: whether
+    the program has stopped a state of it alone.
 
     The thread of the container calls its methods, except `depart_by`, `start_of` and
     `forget_unrecovered`, which belong to the threads of other containers.
@@ -46,7 +47,7 @@ class Execution:
     failures = 0  # so far, without those that the author has foreseen
     starts_in = ''  # '': its initial state
     starts_below: Dict[int, str] = {}  # by the id of a node in the present state. Never written to
-    _is_preempt_told = was_preempted = False
+    _is_preempt_told = was_preempted = was_stopped = False
 
     def __init__(self, node: 'TreeNode') -> None:
         self._node = node

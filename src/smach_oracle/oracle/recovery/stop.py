@@ -2,7 +2,7 @@
 
 from typing import Optional
 
-from ..machine.tree_node import TreeNode
+from ..machine.tree_node import TreeNode, node_of
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import states_of
 
@@ -42,6 +42,22 @@ def is_asked_around(node: TreeNode) -> bool:
             return True
         node = each
     return False
+
+
+def note_stop_of_part(node: TreeNode, label: str) -> bool:
+    """Return whether the program has asked a state, or the machine in it, to stop.
+
+    To be asked of one that has just failed, or says that it was preempted, in a container that was
+    not asked. So the program wants neither the state nor what is around it to be done again.
+    """
+    state = states_of(node.machine)[label]
+    inner = node_of(state)
+    asked = bool(
+        state.preempt_requested()
+        or (inner and (inner.execution.was_preempted or inner.execution.was_stopped))
+    )
+    node.execution.was_stopped = node.execution.was_stopped or asked
+    return asked
 
 
 def winds_down(node: TreeNode) -> bool:
