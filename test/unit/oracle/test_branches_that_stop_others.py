@@ -1,10 +1,11 @@
 """Branches at whose failure `child_termination_cb` has the others stop: they do so at once."""
 
+import copy
 import os
 import threading
 
 import pytest
-from branch_machines import both, inside
+from branch_machines import both, inside, iterator_over
 from machines import (
     FakeExpert,
     FakeHealth,
@@ -17,6 +18,7 @@ from machines import (
 )
 
 import smach
+from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
 BY_FAILURE = {'child_termination_cb': lambda ended: ended['LEFT'] == 'aborted'}
@@ -195,8 +197,42 @@ def test_the_question_about_the_level_above_says_what_a_branch_has_raised():
     with pytest.raises(smach.InvalidUserCodeError):
         machine.run()
     (question,) = expert.questions
-    assert question.failed_state == 'ALL' and 'sensor is dead' in question.text
+    assert question.failed_state == 'ALL'
+    assert '(LEFT failed: ValueError: sensor is dead)' in question.text
     assert bumper.runs == 1
+
+
+def test_the_question_about_the_level_above_says_which_branch_has_failed():
+    _, _, concurrence = beside('aborted', **BY_FAILURE)
+    expert = FakeExpert(give_up())
+    machine = watched(concurrence, expert=expert, settings={'max_recoveries': 0})
+    assert machine.run() == 'aborted'
+    (question,) = expert.questions
+    assert (question.failed_state, question.text) == ('ALL', 'LEFT failed: aborted')
+
+
+def test_the_level_above_says_which_branch_in_an_iterator_has_failed():
+    _, _, concurrence = beside('aborted', **BY_FAILURE)
+    machine = watched(iterator_over(concurrence, items=(1, 2), loop_outcomes=['done']))
+    assert machine.run() == 'done'
+    (above,) = [event for event in machine.of(EventKind.FAILURE) if event.path == 'TOP']
+    assert above.text == 'EACH/LEFT failed: aborted (item 1 of 2)'
+
+
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')), reason="upstream's Concurrence holds a lock"
+)
+def test_a_machine_whose_branch_has_raised_can_be_copied():
+    class Held(Exception):
+        def __init__(self):
+            super().__init__()
+            self.lock = threading.Lock()
+
+    concurrence = both(Scripted(Held()), Scripted())
+    machine = OracleContainer.wrap(inside(concurrence), settings={'max_recoveries': 0})
+    with pytest.raises(smach.InvalidUserCodeError):
+        machine.execute()
+    assert copy.deepcopy(machine).execute() == 'done'
 
 
 def test_an_error_is_recovered_in_its_place_where_no_callback_is_given():

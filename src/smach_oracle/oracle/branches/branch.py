@@ -60,7 +60,6 @@ class Branch(smach.Container):
         self._under_way_in = 0  # that execution, 0 while it is not under way
         self._preempt_requested = False
         self._item: Optional[ItemPort] = None
-        self.raised: Optional[BaseException] = None  # in this execution, with which it gave up
         self._record: Optional[StateRecord] = None
         self._be_idle()
 
@@ -82,7 +81,6 @@ class Branch(smach.Container):
         """Begin an execution of the Concurrence, for which there is no `item`, or Iterator."""
         node = self._oracle
         self._item = item
-        self.raised = None
         # a thread of an earlier execution may have been left behind in it
         self._execution_number += 1
         # the same for all items
@@ -197,10 +195,9 @@ class Branch(smach.Container):
             node.execution.end(None, error)
             self._be_idle()
             self._find_record()
-        self.raised = raised
         if raised.__cause__ is not None and str(raised).startswith(COULD_NOT):
-            self.raised = raised.__cause__  # as bare: the container says what state it was
-        raise self.raised
+            raise raised.__cause__  # as bare: the container says what state it was
+        raise raised
 
     def _step_to_end(self, end: Optional[End]) -> Optional[str]:
         """Step as any wrapped machine does."""

@@ -177,14 +177,12 @@ class ContainerWrapper:
         return self._resumed[0]
 
     def _explain(self, error: BaseException) -> None:
-        """Have an error of the container say what a branch has raised, or ended the program by.
+        """Have an error of the container say that a branch has ended the program by it.
 
         :raises TooDeepError: in its place, where too many containers lie in each other.
         """
         if isinstance(error, smach.InvalidStateError):
-            causes = [branch.raised for branch in self.branches.values()]
-            causes.append(self.parent.tree.early_end.of_program)
-            error.__cause__ = error.__cause__ or next(filter(None, causes), None)
+            error.__cause__ = error.__cause__ or self.parent.tree.early_end.of_program
         if too_deep_below(error) is None:
             top = self.parent.top()
             too_deep = too_deep_here(top.machine, top.path, error)

@@ -123,7 +123,7 @@ def _judge(
         return Failure(
             label,
             FailureKind.EXCEPTION,
-            text=_what_was_raised(error),
+            text=_what_was_raised(error, state),
             error=_once(partial(raised_error, label, state, error)),
             details=traceback_of(error),
         )
@@ -150,7 +150,8 @@ def _judge(
     if route.target and _ended_as_intended(state):
         return route
     if route.target:
-        return Failure(label, kind, outcome, _description(node, label, state), route)
+        text = _description(node, label, state) or _failed_branches(state)
+        return Failure(label, kind, outcome, text, route)
     text = (
         'Outcome {!r} of state {!r} has no transition to a state or a container outcome; '
         'the container has {}'.format(outcome, label, names(machine.get_registered_outcomes()))
@@ -159,13 +160,29 @@ def _judge(
     return Failure(label, kind, outcome, text, route, unbound)
 
 
-def _what_was_raised(error: BaseException) -> str:
-    """Return an error in words, with that of a branch by which a Concurrence raises."""
-    first = error
+def _what_was_raised(error: BaseException, state: smach.State) -> str:
+    """Return an error in words, with that of a state by which a Concurrence raises."""
+    first, text = error, error_text(error)
     while isinstance(first, smach.InvalidStateError) and first.__cause__ is not None:
         first = first.__cause__
-    text = error_text(error)
-    return text if first is error else '{} ({})'.format(text, error_text(first))
+    why = _failed_branches(state) or ('' if first is error else error_text(first))
+    return '{} ({})'.format(text, why) if why else text
+
+
+def _failed_branches(state: smach.State) -> str:
+    """Say how branches that may have others stop have failed: nobody was asked about them."""
+    told = []
+    for node in nodes_in(state):
+        label, latest = node.site.label, node.records.history.latest()[-1:]
+        if node.site.is_container or not latest or latest[0].result is not VisitResult.FAILURE:
+            continue
+        record = node.record(label)
+        if node.site.may_stop_others(record.settings) and record.last_failure is not None:
+            _, outcome, text = record.last_failure
+            how = '{} ({})'.format(outcome, text) if outcome and text else text or outcome
+            path = '/'.join((*node.labels_from_parent[1:], label))
+            told.append('{} failed: {}'.format(path, how))
+    return '; '.join(told)
 
 
 def _ended_as_intended(state: smach.State) -> bool:
