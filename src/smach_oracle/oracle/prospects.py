@@ -12,6 +12,7 @@ from .machine.places import TreePlace, direct_levels, links_to, name_of
 from .machine.site import Route, failure_kind, route_of
 from .machine.tree_node import TreeNode
 from .records.events import FailureKind
+from .recovery.guarding import may_stop_others
 from .recovery.options import Drawn, leading_to
 from .settings.failing_outcomes import PREEMPTED, FailingNames
 from .settings.interfaces import InterfaceOffer
@@ -293,7 +294,7 @@ def _outcome(node: TreeNode, label: str, outcome: str, settings: StateSettings) 
         node.site.shown_route(route, outcome),
         fails,
         fails and node.site.foresees(outcome, route, kind, settings),
-        fails and node.site.may_stop_others(settings),
+        fails and not route.is_state and may_stop_others(node, settings),
     )
 
 

@@ -21,6 +21,8 @@ import smach
 from smach_oracle.oracle import OracleContainer
 from smach_oracle.oracle.records.events import EventKind, FailureKind
 
+ENDS = ('done', 'aborted', 'preempted')
+NEVER = {'child_termination_cb': lambda ended: False}
 BY_FAILURE = {'child_termination_cb': lambda ended: ended['LEFT'] == 'aborted'}
 UPSTREAMS_WAY = pytest.mark.skipif(
     bool(os.environ.get('SMACH_UPSTREAM')),
@@ -333,6 +335,62 @@ def test_a_machine_beside_others_is_recovered_inside():
     )
     assert machine.run() == 'done'
     assert inner.runs == 2
+
+
+def watching(state, outcomes=('aborted', 'preempted')):
+    """A machine that looks again and again, and ends as something is wrong."""
+    machine = smach.StateMachine(outcomes=list(outcomes))
+    with machine:
+        smach.StateMachine.add('LOOK', Scripted(), {'ok': 'CHECK'})
+        smach.StateMachine.add('CHECK', state, {'ok': 'LOOK'})
+    return machine
+
+
+@pytest.mark.parametrize('step', ['aborted', ValueError('dead')])
+def test_a_machine_that_only_watches_stops_them_as_well(step):
+    gate = Gate()
+    check, drive = Bumper(gate, step, 'preempted'), Scripted(gate)
+    machine = watched(
+        both(watching(check, ENDS), drive, outcome_map={'done': {'RIGHT': 'ok'}}, **BY_FAILURE)
+    )
+    assert machine.run() == 'done'
+    assert (check.runs, drive.runs) == (2, 2)
+    assert failures(machine) == [('TOP/ALL/LEFT', 'CHECK'), ('TOP', 'ALL')]
+    assert 'LEFT/CHECK failed: ' in machine.of(EventKind.FAILURE)[1].text
+    assert decisions(machine) == [('TOP', 'ALL')]
+
+
+def test_a_machine_that_watches_is_recovered_inside_where_nothing_stops():
+    check = Scripted('aborted', 'preempted')
+    concurrence = both(
+        watching(check, ENDS), Scripted(), default_outcome='done', outcome_map={}, **NEVER
+    )
+    machine = watched(concurrence)
+    assert machine.run() == 'done'
+    assert check.runs == 2
+    assert decisions(machine) == [('TOP/ALL/LEFT', 'CHECK')]
+
+
+def test_a_branch_that_raises_as_it_is_tried_again_ends_as_it_had_failed():
+    left, right = Scripted('aborted', ValueError('the list is empty')), Scripted(Gate())
+    machine = watched(
+        both(left, right, default_outcome='done', child_termination_cb=ends_by_aborted_twice()),
+        settings={'states': {'ALL/LEFT': {'max_recoveries': 1}}},
+    )
+    assert machine.run() == 'done'
+    assert left.runs == 2
+    assert not [event for event in machine.of(EventKind.FAILURE) if event.path == 'TOP']
+
+
+def ends_by_aborted_twice():
+    """A callback that has the others stop as LEFT ends, and not as it fails first."""
+    told = []
+
+    def ends(ended):
+        told.append(ended['LEFT'])
+        return told.count('aborted') == 2
+
+    return ends
 
 
 def test_a_machine_that_guards_others_stops_them_where_its_end_is_intended():

@@ -9,15 +9,11 @@ from ..asking.question import OutcomeChoice
 from ..identity import attribute_of
 from ..machine.site import Route, Site, judged_at, leads_to_next_item
 from ..machine.tree_node import TreeNode
-from ..machine.workers import recall_preempts
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import (
-    child_termination_cb_of,
     final_outcomes_of,
-    lock_of,
     outcome_map_of,
-    outcomes_so_far,
     states_of,
 )
 from .wrapper import wrapper_of
@@ -75,46 +71,6 @@ class BranchSite(Site):
             if dict(_entries(conditions)).get(self.label) == outcome
         )
 
-    def keeps_authors_way(
-        self, outcome: str, route: Optional[Route], kind: FailureKind, settings: StateSettings
-    ) -> bool:
-        """Whether, besides, the author has the others stop at the failure."""
-        if super().keeps_authors_way(outcome, route, kind, settings):
-            return True
-        overruns = kind is FailureKind.TIME_LIMIT  # which no state does without an oracle
-        if overruns or not self.may_stop_others(settings):
-            return False
-        return self._stops_others(None if route is None else outcome)
-
-    def may_stop_others(self, settings: StateSettings) -> bool:
-        """Whether `child_termination_cb` is asked at a failure."""
-        has_callback = child_termination_cb_of(self.container) is not None
-        return has_callback and settings.author_recoveries != 'override'
-
-    def _stops_others(self, outcome: Optional[str]) -> bool:
-        """Whether others that still run would have to stop without an oracle.
-
-        `child_termination_cb` says so. An error stops them in any case: `outcome` is None then.
-        """
-        outcomes = {**outcomes_so_far(self.container), self.label: outcome}
-        running = {each for each in outcomes if outcomes[each] is None} - {self.label}
-        if outcome is None or not running:
-            return bool(running)
-        callback: Any = child_termination_cb_of(self.container)
-        branch = self._node.machine
-        lock = lock_of(branch)
-        lock.release()  # the callback may preempt the branches
-        try:
-            stopped = callback(outcomes)
-            is_list = isinstance(stopped, (list, tuple, set, frozenset))
-            return not running.isdisjoint(stopped) if is_list else bool(stopped)
-        except BaseException:  # it raises once the branch has ended, and that stops them
-            return True
-        finally:
-            lock.acquire()
-            if branch.preempt_requested():  # the request has come after the end of the state
-                recall_preempts(states_of(branch)[self.label])
-
     def shown_route(self, route: Route, outcome: str) -> Route:
         """Say where an outcome leads, for people."""
         return Route(self._leads_to(outcome), True)
@@ -149,10 +105,6 @@ class IteratorSite(BranchSite):
     def settings_here(self, settings: Settings) -> Settings:
         """Return the settings of the whole machine as they are: its state runs alone."""
         return settings
-
-    def may_stop_others(self, settings: StateSettings) -> bool:
-        """There are none."""
-        return False
 
     def _is_drawn(self, outcome: str) -> bool:
         """Whether it leads to the next item, or is mapped to what is no failure."""

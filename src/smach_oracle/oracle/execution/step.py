@@ -32,6 +32,7 @@ from ..recovery.failure import (
     tell_failure,
     with_earlier_end,
 )
+from ..recovery.guarding import keeps_authors_way, may_stop_others
 from ..recovery.occasions import FirstStep, Occasion
 from ..recovery.phases import OracleState
 from ..recovery.recovery import Recovery
@@ -153,8 +154,8 @@ class Step:
         if stopping or is_part:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_preempted(judged)
-        keeps_way = node.tree.recover and self._author_recovers(judged)
-        at_once = keeps_way and node.site.may_stop_others(record.settings)
+        keeps_way = node.tree.recover and keeps_authors_way(node, judged, record.settings)
+        at_once = keeps_way and may_stop_others(node, record.settings)
         why = None
         if node.tree.recover and node.tree.health.is_set and not at_once:
             why = self._why_unwell()
@@ -323,11 +324,6 @@ class Step:
     def _context(self) -> FailureContext:
         """Return what the visits so far say about a failure of the state."""
         return failure_context(self._node, self._record)
-
-    def _author_recovers(self, failure: Failure) -> bool:
-        return self._node.site.keeps_authors_way(
-            failure.outcome, failure.route, failure.kind, self._record.settings
-        )
 
     def _tell_own_loop(self, outcome: str, route: Route) -> None:
         """Say, once in a trial, that the state keeps failing on the way that its author drew."""

@@ -136,16 +136,6 @@ class Site:
         recovers = author_recovers(outcome, route, kind, settings)
         return recovers and not goes_unnoticed(self._node, route)
 
-    def keeps_authors_way(
-        self, outcome: str, route: Optional[Route], kind: FailureKind, settings: StateSettings
-    ) -> bool:
-        """Whether a failure under way goes as without an oracle. `route`: None where it raised."""
-        return route is not None and self.foresees(outcome, route, kind, settings)
-
-    def may_stop_others(self, settings: StateSettings) -> bool:
-        """Whether a failure may go that way because others run beside the state."""
-        return False
-
     def shown_route(self, route: Route, outcome: str) -> Route:
         """Return where an outcome leads, for people."""
         return route

@@ -25,6 +25,7 @@ from ..records.events import EventKind, FailureKind
 from ..records.visits import Visit, VisitResult
 from ..settings.failing_outcomes import is_preempted
 from ..smach_private import states_of
+from .guarding import may_stop_others
 from .stop import winds_down
 
 
@@ -173,14 +174,16 @@ def _failed_branches(state: smach.State) -> str:
     """Say how branches that may have others stop have failed: nobody was asked about them."""
     told = []
     for node in nodes_in(state):
-        label, latest = node.site.label, node.records.history.latest()[-1:]
-        if node.site.is_container or not latest or latest[0].result is not VisitResult.FAILURE:
+        latest = node.records.history.latest()[-1:]
+        if not any(
+            visit.result is VisitResult.FAILURE and node.has(visit.state) for visit in latest
+        ):
             continue
-        record = node.record(label)
-        if node.site.may_stop_others(record.settings) and record.last_failure is not None:
+        record = node.record(latest[0].state)
+        if may_stop_others(node, record.settings) and record.last_failure is not None:
             _, outcome, text = record.last_failure
             how = '{} ({})'.format(outcome, text) if outcome and text else text or outcome
-            path = '/'.join((*node.labels_from_parent[1:], label))
+            path = '/'.join((*node.labels_from_parent[1:], record.label))
             told.append('{} failed: {}'.format(path, how))
     return '; '.join(told)
 

@@ -44,9 +44,8 @@ class BranchPart(MachinePart):
         own = self.settings_of(failed.label).author_recoveries
         if (own or self.run.plan.author_recoveries) == 'override':
             return False
-        if isinstance(self.parent, ConcurrencePart) and failed.kind != 'TIME_LIMIT':
-            if self.parent.would_stop(self.label, failed.way and failed.outcome):
-                return True
+        if self.stops_others(failed):
+            return True
         if failed.way is None:
             return False
         if isinstance(self.parent, IteratorPart):
@@ -59,6 +58,10 @@ class BranchPart(MachinePart):
             wanted.get(self.label) == failed.outcome and not _is_failure(self.parent, name)
             for name, wanted in self.parent.plan.outcome_map.items()
         )
+
+    def only_watches(self) -> bool:
+        """A plain state ends its branch as it fails, whatever it is."""
+        return isinstance(self.parent, ConcurrencePart)
 
     def after_jump(self, target: str, written: Set[str]) -> Dict[str, Any]:
         """The userdata that a retry leaves: that of a Concurrence stays live."""

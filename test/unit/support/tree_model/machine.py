@@ -4,7 +4,7 @@ from typing import Any, Dict, List, Optional, Set, Tuple
 
 from .ends import Failed, Goal, Way
 from .memory import PREEMPTED, SUCCESS, Remembered
-from .parts import OVERRUN, Jumping, Part, Raised, View
+from .parts import OVERRUN, ConcurrencePart, Jumping, Part, Raised, View
 from .plan import Machine
 from .recovering import Recovering
 from .scheduling import Course
@@ -32,6 +32,7 @@ class MachinePart(Part, Recovering):
         # of failures that the oracle has led elsewhere, by their states, which have not succeeded
         # since
         self._ends: Dict[str, Way] = {}
+        self._has_failed = False  # in this execution, other than as its author has foreseen
         self.begins_in: Optional[str] = None  # its next execution
 
     def children(self) -> List[Part]:
@@ -46,6 +47,7 @@ class MachinePart(Part, Recovering):
         self.ended_as_meant = False
         self._natural = None
         self._ends.clear()
+        self._has_failed = False
         self._preempted = None
         self.work = None
         self.snapshots.clear()
@@ -178,6 +180,7 @@ class MachinePart(Part, Recovering):
         if self.author_recovers(failed):
             memory.keep_failure(self.run.plan.policy, label, failed.outcome, continuous)
             return self.end_naturally(failed)
+        self._has_failed = True
         self.note_end(failed)
         if failed.ending is None:
             failed = failed._replace(ending=next(iter(self._ends.values()), None))
@@ -296,7 +299,27 @@ class MachinePart(Part, Recovering):
 
     def author_recovers(self, failed: Failed) -> bool:
         """Whether the author's own transition stays."""
-        return self.author_drew(failed) and not self.is_unnoticed(failed)
+        is_drawn = self.author_drew(failed) and not self.is_unnoticed(failed)
+        return is_drawn or self.stops_others(failed)
+
+    def stops_others(self, failed: Failed) -> bool:
+        """Whether what runs beside this container has to stop, as its author has said."""
+        own = self.settings_of(failed.label).author_recoveries
+        is_override = (own or self.run.plan.author_recoveries) == 'override'
+        if is_override or failed.kind == 'TIME_LIMIT' or not self.only_watches():
+            return False
+        if failed.way is None or not failed.way.target:
+            return not self._has_failed and self.parent.would_stop(self.label, None)
+        return not failed.way.is_state and self.parent.would_stop(self.label, failed.way.target)
+
+    def only_watches(self) -> bool:
+        """Whether it is a branch of a Concurrence that can end by failures alone."""
+        ways = (
+            self.way_of(child.label, end) for child in self._children for end in child.plan.outcomes
+        )
+        ends = {way.target for way in ways if not way.is_state and way.target} - {'preempted'}
+        is_branch = isinstance(self.parent, ConcurrencePart)
+        return is_branch and bool(ends) and all(sounds_like_failure(end) for end in ends)
 
     def is_unnoticed(self, failed: Failed) -> bool:
         """Whether it ends this container, which has no outcome by which a failure shows."""
