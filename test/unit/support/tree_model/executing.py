@@ -140,10 +140,13 @@ class _InTurn(OracleState):
 
         Whoever takes a turn later does not wait for those again.
         """
-        branches = owed_branches(self._node.machine._states[recovery.failure.state])
+        own = self._node.machine._states[recovery.failure.state]  # its oracle is asked in its place
+        branches = owed_branches(own)
         end = time.monotonic() + self._world.patience_s
         while branches and time.monotonic() < end:
-            if recovery.stopped() and all(each.preempt_requested() for each in branches):
+            if recovery.stopped() and all(
+                each is own or each.preempt_requested() for each in branches
+            ):
                 return
             time.sleep(0.001)  # it comes in the thread of a branch beside
 
