@@ -43,10 +43,10 @@ class Bumper(Scripted):
         return super().execute(ud)
 
 
-def beside(*steps, drive=(), **options):
+def beside(*steps, **options):
     """LEFT takes these steps beside RIGHT, which drives until it is preempted."""
     gate = Gate()
-    left, right = Bumper(gate, *steps), Scripted(gate, *drive)
+    left, right = Bumper(gate, *steps), Scripted(gate)
     return left, right, both(left, right, **options)
 
 

@@ -11,11 +11,7 @@ from ..machine.site import Route, Site, judged_at, leads_to_next_item
 from ..machine.tree_node import TreeNode
 from ..records.events import Event, EventKind, FailureKind
 from ..settings.settings import Settings, StateSettings
-from ..smach_private import (
-    final_outcomes_of,
-    outcome_map_of,
-    states_of,
-)
+from ..smach_private import final_outcomes_of, outcome_map_of, states_of
 from .wrapper import wrapper_of
 
 NEXT_ITEM = 'the next item'

@@ -155,9 +155,14 @@ class Step:
             node.records.visit_ended(record, judged.outcome, VisitResult.PREEMPTED)
             return self._end_preempted(judged)
         keeps_way = node.tree.recover and keeps_authors_way(node, judged, record.settings)
-        at_once = keeps_way and may_stop_others(node, record.settings)
         why = None
-        if node.tree.recover and node.tree.health.is_set and not at_once:
+        if (
+            node.tree.recover
+            and node.tree.health.is_set
+            and not (
+                keeps_way and may_stop_others(node, record.settings)  # who are to stop at once
+            )
+        ):
             why = self._why_unwell()
         if node.execution.is_left_behind():
             return stop_left_behind(node)

@@ -41,23 +41,30 @@ def keeps_authors_way(node: TreeNode, failure: 'Failure', settings: StateSetting
         return True
     if failure.kind is FailureKind.TIME_LIMIT:  # no state overruns without an oracle
         return False
-    if (route is not None and route.is_state) or not may_stop_others(node, settings):
+    place = _asked_place(node, settings)
+    if place is None or (route is not None and route.is_state):
         return False
     outcome = route.target if route is not None else ''
     if not outcome and node.execution.failures:  # without an oracle it would not have come to raise
         return False
-    return _stops_others(node, failure.state, outcome or None)
+    return _stops_others(node, place, failure.state, outcome or None)
 
 
 def may_stop_others(node: TreeNode, settings: StateSettings) -> bool:
     """Whether a `child_termination_cb` is asked as a state fails, and so ends the container."""
+    return _asked_place(node, settings) is not None
+
+
+def _asked_place(node: TreeNode, settings: StateSettings) -> Optional[_Place]:
+    """Return the branch about which a `child_termination_cb` is asked, None where none is."""
     place = _place_of(node)
-    return (
+    is_asked = (
         place is not None
         and settings.author_recoveries != 'override'
         and child_termination_cb_of(place.concurrence) is not None
         and (not node.site.is_container or _only_watches(node))
     )
+    return place if is_asked else None
 
 
 def _place_of(node: TreeNode) -> Optional[_Place]:
@@ -84,14 +91,12 @@ def _only_watches(node: TreeNode) -> bool:
     return bool(ends) and all(each in node.in_force.failing for each in ends)
 
 
-def _stops_others(node: TreeNode, state: str, outcome: Optional[str]) -> bool:
+def _stops_others(node: TreeNode, place: _Place, state: str, outcome: Optional[str]) -> bool:
     """Whether others that still run would have to stop if the branch ended now.
 
     An error, for which `outcome` is None, stops them in any case.
     """
-    place, machine = _place_of(node), node.machine
-    if place is None:
-        return False
+    machine = node.machine
     outcomes = {**outcomes_so_far(place.concurrence), place.label: outcome}
     running = {each for each in outcomes if outcomes[each] is None} - {place.label}
     if outcome is None or not running:
