@@ -71,10 +71,14 @@ def _is_hashable(value: object) -> bool:
 
 
 def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
-    """Return an answer with the container of what it names.
+    """Return an answer with the container of what it names, and the outcome itself.
 
     A state that the container of the failed state has not, and one other has, is that one's.
+    An outcome that is no text is answered by its text.
     """
+    for outcome in _outcomes_for(answer, choices):
+        if not isinstance(outcome, str) and str(outcome) == answer.outcome:
+            answer = answer._replace(outcome=outcome)
     is_beside = (answer.container, answer.state) in choices.states  # another branch
     if answer.container == choices.container and not is_beside:
         return answer._replace(container='')
@@ -82,6 +86,15 @@ def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
         return answer
     found = [path for path, label in choices.states if label == answer.state]
     return answer._replace(container=found[0]) if len(found) == 1 else answer
+
+
+def _outcomes_for(answer: Answer, choices: AnswerChoices) -> Sequence[str]:
+    """Return the outcomes of which an answer may name one."""
+    if answer.kind is AnswerKind.SUPERSEDE:
+        return choices.supersede_outcomes
+    if answer.container in ('', choices.container):
+        return choices.give_up_outcomes
+    return [outcome for path, outcome in choices.give_up_above if path == answer.container]
 
 
 def check_answer(answer: Answer, choices: AnswerChoices) -> None:
@@ -148,10 +161,8 @@ def _check_supersede(answer: Answer, choices: AnswerChoices) -> None:
 
 def _check_give_up(answer: Answer, choices: AnswerChoices) -> None:
     container = answer.container or choices.container
-    allowed, more = choices.give_up_outcomes, ', or none at all'
-    if answer.container:
-        allowed = [outcome for path, outcome in choices.give_up_above if path == container]
-        more = ''
+    allowed = _outcomes_for(answer, choices)
+    more = '' if answer.container else ', or none at all'
     if answer.outcome not in allowed and (answer.outcome or answer.container):
         _refuse(
             '{} has no outcome {!r} to give up with'.format(container, answer.outcome),

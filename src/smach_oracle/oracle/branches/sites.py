@@ -87,7 +87,7 @@ class BranchSite(Site):
     def ended_by(self, event: Event) -> Optional[str]:
         """Return the outcome with which the branch ends at an event, None for other events."""
         outcome = event.outcome if event.kind is EventKind.GIVE_UP else event.target
-        is_end = event.kind in _LEAVES and outcome and not self._node.is_oracle(outcome)
+        is_end = event.kind in _LEAVES and outcome != '' and not self._node.is_oracle(outcome)
         return outcome if is_end else None
 
     def is_line_over(self, event: Event) -> bool:

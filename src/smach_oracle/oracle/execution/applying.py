@@ -1,10 +1,10 @@
 """Carries out a verdict: the one place that moves a machine from the meta state."""
 
-from typing import Dict, Optional
+from typing import Dict, Optional, cast
 
 from ..machine.repeats import note_superseded
 from ..machine.site import route_of
-from ..records.events import EventKind
+from ..records.events import EventKind, in_event
 from ..records.facts import JUMPED_FROM, JUMPED_TO
 from ..records.visits import VisitResult
 from ..recovery.levels import unnoticed
@@ -115,7 +115,7 @@ class Applying:
         told = '{}; {}'.format(text, ending.error) if ending.error is not None else text
         if ending.state is None and unnoticed(node, self._occasion.failure) is None:
             node.execution.give_up()
-        outcome, target = ending.outcome or '', ending.state or ''
+        outcome, target = in_event(ending.outcome), ending.state or ''
         node.emit(EventKind.GIVE_UP, self._record.label, outcome, target, by=verdict.by, text=told)
         return self._end(ending, verdict.by, text)
 
@@ -136,7 +136,7 @@ class Applying:
         if ending.state is not None:
             self._go_on(ending.state, by, text)
             return None
-        return self._terminate(str(ending.outcome))
+        return self._terminate(cast('str', ending.outcome))
 
     def _service_preempt(self) -> None:
         self._meta.service_preempt()

@@ -195,7 +195,7 @@ def _pass_by(node: TreeNode) -> Optional[Stop]:
     machine = node.machine
     label = current_label_of(machine)
     route, down = _behind(node, label)
-    if not route.target:
+    if not route.leads_on:
         return None
     state = states_of(machine)[label]
     node.execution.tell_preempt()
@@ -225,7 +225,7 @@ def _behind(node: TreeNode, label: str) -> Tuple[Route, Down]:
         route, down = _behind(inner, led[0] if led else initial_label_of(inner.machine))
         if route.is_state:
             return Route(label, True), (TreePlace(inner, route.target), *down)
-        if route.target:
+        if route.leads_on:
             return route_of(node.machine, label, route.target), ()
     return route_at_preempt(node.machine, label), ()
 

@@ -19,7 +19,7 @@ from ..machine.oracle import load_rates, save_rates
 from ..machine.repeats import begin_watching
 from ..machine.tree_node import TreeNode
 from ..machine.workers import recall_preempts
-from ..records.events import EventKind
+from ..records.events import EventKind, in_event
 from ..records.facts import CAN_GO_ON, ENDED_BY, INPUTS, ORIGIN, TrialEnd
 from ..records.rates_file import learned_by
 from ..records.running_goals import GOALS, RunningGoals
@@ -144,13 +144,13 @@ class ContainerRun(Execution):
         learned = {'learned': learned_by(nodes_of(node.machine))} if with_rates else {}
         node.emit(
             EventKind.TRIAL_END,
-            outcome=outcome or '',
+            outcome=in_event(outcome),
             text=why_no_outcome(outcome, error),
             data={ENDED_BY: why.value, **goes_on, **learned},
         )
         save_rates(node)
         if store is not None:
-            store.end(why, outcome or '', time.time())
+            store.end(why, in_event(outcome), time.time())
 
     def _why_over(self, error: Optional[BaseException]) -> TrialEnd:
         node = self._node

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Dict, Iterable, Optional, Protocol, Tuple
 import smach
 from smach_common.foreign import error_text
 
-from ..records.events import NO_OUTCOME, EventKind
+from ..records.events import NO_OUTCOME, EventKind, in_event
 from ..scope.scope import Reason, Scope, scopes_of_thread
 from ..smach_private import Labels, current_label_of, initial_label_of, set_executing, states_of
 
@@ -144,7 +144,7 @@ class Execution:
         node.records.streaks.end_execution()
         if node.events.observers and node.site.is_container:
             why = why_no_outcome(outcome, error)
-            node.emit(EventKind.CONTAINER_END, outcome=outcome or '', text=why)
+            node.emit(EventKind.CONTAINER_END, outcome=in_event(outcome), text=why)
         self.runs_around = ()
         self.failures = 0
         node.records.drop_snapshots()

@@ -20,6 +20,11 @@ class Route(NamedTuple):
     target: str  # a state, a container outcome, or '' where it leads nowhere
     is_state: bool
 
+    @property
+    def leads_on(self) -> bool:
+        """Whether it leads anywhere. An outcome need not be text, and may be False or 0."""
+        return self.target != ''
+
 
 def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
     """Follow an outcome of a state.
@@ -43,11 +48,11 @@ def failure_kind(
     outcome: str, route: Route, settings: StateSettings, failing: FailingNames
 ) -> FailureKind:
     """Classify a registered outcome, without regard to who recovers from it."""
-    if route.target and outcome in settings.intended_outcomes:
+    if route.leads_on and outcome in settings.intended_outcomes:
         return FailureKind.NOT_A_FAILURE
     if outcome in settings.failure_outcomes:
         return FailureKind.FAILING_OUTCOME
-    if not (route.is_state or route.target):
+    if not route.leads_on:
         return FailureKind.UNREGISTERED_OUTCOME
     if not route.is_state and route.target in failing:
         excused = failing.excuse(outcome)
@@ -145,7 +150,7 @@ class Site:
         outcomes = sorted(states_of(self._node.machine)[label].get_registered_outcomes(), key=str)
         routes = ((outcome, route_of(self._node.machine, label, outcome)) for outcome in outcomes)
         return tuple(
-            OutcomeChoice(outcome, route.target) for outcome, route in routes if route.target
+            OutcomeChoice(outcome, route.target) for outcome, route in routes if route.leads_on
         )
 
     # -- what is told
@@ -155,7 +160,8 @@ class Site:
 
     def ended_by(self, event: Event) -> Optional[str]:
         """Return the outcome with which it ends at an event of its own, None for other events."""
-        return event.kind is EventKind.CONTAINER_END and event.outcome or None
+        is_end = event.kind is EventKind.CONTAINER_END and event.outcome != ''
+        return event.outcome if is_end else None
 
     def is_line_over(self, event: Event) -> bool:
         """Whether no state follows in its thread, that of a Concurrence, after an event."""

@@ -108,6 +108,11 @@ class Event(NamedTuple):
     data: Optional[Mapping[str, Any]] = None  # plain data
 
 
+def in_event(outcome: Optional[str]) -> str:
+    """Return an outcome as an event has it, '' for none. It need not be text."""
+    return '' if outcome is None else outcome
+
+
 _new_tuple = tuple.__new__
 # what it holds behind `target` where nothing else is said
 _REST = tuple(Event._field_defaults.values())[3:]

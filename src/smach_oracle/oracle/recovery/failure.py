@@ -148,9 +148,9 @@ def _judge(
     kind = failure_kind(outcome, route, record.settings, node.in_force.failing)
     if kind is FailureKind.NOT_A_FAILURE:
         return route
-    if route.target and _ended_as_intended(state):
+    if route.leads_on and _ended_as_intended(state):
         return route
-    if route.target:
+    if route.leads_on:
         text = _description(node, label, state) or _failed_branches(state)
         return Failure(label, kind, outcome, text, route)
     text = (
@@ -216,7 +216,7 @@ def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
     failure = Failure(label, before.kind, before.outcome, before.text)
     if before.outcome:
         route = route_of(node.machine, label, before.outcome)
-        if route.target:
+        if route.leads_on:
             return failure._replace(route=route)
     raises_none = (FailureKind.INTERRUPTED, FailureKind.TIME_LIMIT, FailureKind.HELD_BACK)
     if before.kind in raises_none:
@@ -244,7 +244,7 @@ def with_earlier_end(node: TreeNode, failure: Failure) -> Failure:
     :param failure: its visit is the latest one. The author has not foreseen it.
     """
     node.execution.failures += 1
-    if failure.error is None or (failure.route is not None and failure.route.target):
+    if failure.error is None or (failure.route is not None and failure.route.leads_on):
         return failure
     visits = node.records.history.latest()
     ends: Dict[str, Route] = {}
@@ -256,7 +256,7 @@ def with_earlier_end(node: TreeNode, failure: Failure) -> Failure:
         elif visit.result is VisitResult.FAILURE and node.has(visit.state):
             route, kind = judged_at(node, visit.state, visit.outcome)
             settings = node.settings_of(visit.state)
-            is_failure = bool(route.target) and kind is not FailureKind.NOT_A_FAILURE
+            is_failure = route.leads_on and kind is not FailureKind.NOT_A_FAILURE
             if is_failure and not node.site.foresees(visit.outcome, route, kind, settings):
                 ends.setdefault(visit.state, route)
     return failure._replace(earlier_route=next(iter(ends.values()), None))

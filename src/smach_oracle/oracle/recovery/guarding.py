@@ -44,10 +44,11 @@ def keeps_authors_way(node: TreeNode, failure: 'Failure', settings: StateSetting
     place = _asked_place(node, settings)
     if place is None or (route is not None and route.is_state):
         return False
-    outcome = route.target if route is not None else ''
-    if not outcome and node.execution.failures:  # without an oracle it would not have come to raise
+    outcome = route.target if route is not None and route.leads_on else None
+    # without an oracle it would not have come to raise
+    if outcome is None and node.execution.failures:
         return False
-    return _stops_others(node, place, failure.state, outcome or None)
+    return _stops_others(node, place, failure.state, outcome)
 
 
 def may_stop_others(node: TreeNode, settings: StateSettings) -> bool:
@@ -86,7 +87,7 @@ def _only_watches(node: TreeNode) -> bool:
         for label in node.labels()
         for outcome in states_of(node.machine)[label].get_registered_outcomes()
         for route in (route_of(node.machine, label, outcome),)
-        if route.target and not route.is_state and not is_preempted(route.target)
+        if route.leads_on and not route.is_state and not is_preempted(route.target)
     }
     return bool(ends) and all(each in node.in_force.failing for each in ends)
 

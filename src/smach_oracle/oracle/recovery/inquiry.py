@@ -168,7 +168,7 @@ class Inquiry:
             if given is None:
                 self._recovery.tried.append('interface {}: failed'.format(offer.name))
                 return None
-            done = checked_type(given)
+            done = addressed(checked_type(given), choices_of(question))
             if done.kind is not AnswerKind.SUPERSEDE:
                 raise AnswerError('it gave {}, allowed: SUPERSEDE'.format(done.kind.name))
             self._check(done, question)

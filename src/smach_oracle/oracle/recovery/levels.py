@@ -72,7 +72,7 @@ def foreseen_above(
             )
         label = node.labels_from_parent[0]
         route, kind = judged_at(above, label, outcome)
-        if kind is FailureKind.NOT_A_FAILURE or not route.target:
+        if kind is FailureKind.NOT_A_FAILURE or not route.leads_on:
             return None
         if author_recovers(outcome, route, kind, above.settings_of(label)):
             return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))

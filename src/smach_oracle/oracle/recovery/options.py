@@ -231,7 +231,7 @@ def _may_end_well(node: TreeNode, label: str) -> bool:
         for outcome in dict(transitions_of(node.machine).get(label, {}))
     )
     return any(
-        route.target
+        route.leads_on
         and not route.is_state
         and route.target not in node.in_force.failing
         and not is_preempted(route.target)

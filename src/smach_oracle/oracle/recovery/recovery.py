@@ -277,7 +277,7 @@ class Recovery:
 
     def ending(self, outcome: str = '') -> ContainerEnding:
         """End the container with an outcome, or ('') as the failure would have ended it."""
-        if outcome:
+        if outcome != '':
             return ContainerEnding(outcome=outcome)
         return natural_ending(self.node, self.failure)
 

@@ -13,6 +13,7 @@ from ..machine.places import JumpPath, repeated_on, why_closed_on
 from ..machine.site import Route, route_of
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode
+from ..records.events import in_event
 from ..records.streaks import OpenStreak
 from ..scope.scope import Reason
 from ..settings.failing_outcomes import PREEMPTED, is_preempted
@@ -173,7 +174,8 @@ def leads_to(verdict: Verdict) -> str:
         return verdict.jump_path.first_label
     if isinstance(verdict, Supersede):
         return verdict.outcome
-    return verdict.ending.state or verdict.ending.outcome or ''
+    ending = verdict.ending
+    return ending.state or in_event(ending.outcome)
 
 
 # -- endings
@@ -192,7 +194,7 @@ def natural_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     overrun has no such ending, since the state would still run: the container's own failing
     outcome, else an error.
     """
-    if failure.route is not None and failure.route.target:
+    if failure.route is not None and failure.route.leads_on:
         return _ending_by(failure.route)
     if failure.earlier_route is not None:
         return _ending_by(failure.earlier_route)
@@ -228,7 +230,7 @@ def preempted_ending(node: TreeNode, failure: Failure) -> ContainerEnding:
     is_preempt_alone = node.execution.scope.reasons == {Reason.PREEMPTED}
     if is_preempt_alone and not node.tree.workers.blocked(states_of(machine)[failure.state]):
         route = route_at_preempt(machine, failure.state)
-        if route.target:
+        if route.leads_on:
             return _ending_by(route, obeys=True)
     if PREEMPTED in machine.get_registered_outcomes():
         return ContainerEnding(outcome=PREEMPTED)

@@ -2,7 +2,7 @@
 
 import re
 from functools import lru_cache
-from typing import Callable, Iterable, List, Optional, Pattern, Tuple
+from typing import Callable, Iterable, List, Optional, Pattern, Tuple, cast
 
 PREEMPTED = 'preempted'
 # the rule of earlier versions, by which their trials are counted. These come first of several
@@ -64,9 +64,10 @@ class FailingNames:
         """Return how a copied or pickled one is made: by its words."""
         return type(self), (None if self.by_name else self.first,)
 
-    def excuse(self, outcome: str) -> bool:
+    def excuse(self, outcome: object) -> bool:
         """Whether an outcome is no failure of its state although it ends the container in one."""
-        return self.by_name and (is_preempted(outcome) or sounds_like_success(outcome))
+        is_named = self.by_name and isinstance(outcome, str)
+        return is_named and (is_preempted(outcome) or sounds_like_success(cast('str', outcome)))
 
 
 @lru_cache(_MOST_KNOWN)

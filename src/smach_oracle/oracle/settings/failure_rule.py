@@ -61,12 +61,13 @@ class FailureRule(NamedTuple):
         """Whether this version does not know it, and uses its own instead."""
         return self.words is None and self.version > BY_NAME_VERSION
 
-    def meaning(self, end: str) -> EndMeaning:
+    def meaning(self, end: object) -> EndMeaning:
         """Return what it means that a machine has ended in this outcome.
 
-        By a list, each outcome that is not on it is a success.
+        By a list, each outcome that is not on it is a success. One that is no text goes by its
+        text, as which it is recorded.
         """
-        return _meaning_by(self.words, end)
+        return _meaning_by(self.words, end if isinstance(end, str) else str(end))
 
     def unknown(self, ends: Iterable[object]) -> Tuple[str, ...]:
         """Return those of some ends whose names say neither success nor failure, sorted."""

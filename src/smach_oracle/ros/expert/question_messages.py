@@ -154,15 +154,15 @@ def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:
 
 
 def _sendable(message: genpy.Message) -> genpy.Message:
-    """The message, with every text in it such that rospy can send it."""
-    for field in message.__slots__:
-        setattr(message, field, _sendable_field(getattr(message, field)))
+    """The message, with every text in it such that rospy can send it. Outcomes may be no text."""
+    for field, kind in zip(message.__slots__, message._slot_types):
+        setattr(message, field, _sendable_field(getattr(message, field), kind))
     return message
 
 
-def _sendable_field(value: object) -> object:
-    if isinstance(value, str):
-        return sendable_text(value)
+def _sendable_field(value: object, kind: str) -> object:
     if isinstance(value, list):
-        return [_sendable_field(item) for item in value]
+        return [_sendable_field(item, kind.partition('[')[0]) for item in value]
+    if kind == 'string':
+        return sendable_text(value)
     return _sendable(value) if isinstance(value, genpy.Message) else value

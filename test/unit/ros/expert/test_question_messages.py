@@ -9,6 +9,7 @@ import pytest
 from expert_fixtures import make_question
 
 from smach_oracle.msg import ExpertDecision, ExpertQueryGoal, SharedAutonomyGoal, UserdataItem
+from smach_oracle.oracle.asking.question import OutcomeChoice
 from smach_oracle.oracle.errors import AnswerError
 from smach_oracle.oracle.records.visits import Visit, VisitResult
 from smach_oracle.oracle.settings.interfaces import InterfaceOffer
@@ -40,6 +41,22 @@ def test_a_text_that_utf_8_cannot_say_is_written_out():
         written,
         written,
     )
+
+
+def test_outcomes_that_are_no_text_are_sent_as_their_text():
+    question = make_question(
+        outcome=False,
+        history=(Visit('PICK', 2, VisitResult.FAILURE),),
+        supersede_outcomes=(OutcomeChoice(True, 1),),
+        give_up_outcomes=(0, None),
+    )
+    goal = over_the_wire(to_goal(question, 'robot', NOW))
+    choice = goal.supersede_outcomes[0]
+    assert (goal.outcome, goal.history[0].outcome) == ('False', '2')
+    assert (choice.outcome, choice.target) == ('True', '1')
+    assert goal.give_up_outcomes == ['0', 'None']
+    wanted = over_the_wire(to_interface_goal(InterfaceOffer('assist', '/assist'), question))
+    assert wanted.outcomes == ['True']
 
 
 def test_other_languages_arrive_as_they_are():

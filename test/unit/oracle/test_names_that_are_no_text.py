@@ -1,0 +1,164 @@
+"""Outcomes and labels may be numbers, truth values or members of an Enum, as SMACH allows."""
+
+import enum
+import os
+
+import pytest
+from machines import FakeExpert, Scripted
+
+import smach
+from smach_oracle.oracle import OracleContainer
+from smach_oracle.oracle.asking.question import Answer, AnswerKind
+from smach_oracle.oracle.errors import LabelError
+from smach_oracle.oracle.settings.failure_rule import EndMeaning, FailureRule
+
+
+class Seen(enum.Enum):
+    GOOD = 1
+    BAD = 2
+
+
+NAMES = [(Seen.GOOD, Seen.BAD), (0, 1), (1, 0), (True, False), (False, True)]
+
+
+def tree(good, bad, *script, ends=None):
+    """A, and a machine with B in it, which end as the script says."""
+    end, failing = ends or (good, bad)
+    steps, runs = list(script), []
+
+    def work(state, userdata):
+        runs.append(state)
+        step = steps.pop(0) if steps else good
+        if isinstance(step, Exception):
+            raise step
+        return step
+
+    inner = smach.StateMachine(outcomes=[good, bad])
+    machine = smach.StateMachine(outcomes=[end, failing])
+    states = [Scripted(*[work] * 30, outcomes=(good, bad)) for _ in range(2)]
+    with inner:
+        smach.StateMachine.add('B', states[1])
+    with machine:
+        smach.StateMachine.add('A', states[0], {good: 'IN', bad: failing})
+        smach.StateMachine.add('IN', inner, {good: end, bad: failing})
+    return machine, runs
+
+
+@pytest.mark.parametrize('good, bad', NAMES)
+@pytest.mark.parametrize('is_bad', [(), (True,), (False, True)])
+def test_a_machine_ends_as_without_an_oracle(good, bad, is_bad):
+    script = [bad if each else good for each in is_bad]
+    bare, bare_runs = tree(good, bad, *script)
+    wrapped, runs = tree(good, bad, *script)
+    outcome = OracleContainer.wrap(wrapped).execute()
+    assert (outcome, type(outcome)) == (bare.execute(), type(good))
+    assert len(runs) == len(bare_runs)
+
+
+@pytest.mark.parametrize('good, bad', NAMES)
+def test_what_raises_is_tried_again(good, bad):
+    machine, runs = tree(good, bad, good, ValueError('no arm'))
+    assert OracleContainer.wrap(machine).execute() is good
+    assert len(runs) == 3
+
+
+def test_a_failing_end_is_one_whatever_leads_there():
+    machine, runs = tree(Seen.GOOD, Seen.BAD, Seen.BAD, ends=('succeeded', 'aborted'))
+    assert OracleContainer.wrap(machine).execute() == 'succeeded'
+    assert len(runs) == 3
+
+
+@pytest.mark.parametrize('ends', [(1, 2), (1, 0), (True, False)])
+def test_a_machine_given_up_ends_in_the_outcome_itself(ends):
+    machine, _ = tree('succeeded', 'aborted', *['aborted'] * 30, ends=ends)
+    assert OracleContainer.wrap(machine).execute() is ends[1]
+
+
+@pytest.mark.parametrize('good, bad', NAMES)
+@pytest.mark.parametrize('kind', [AnswerKind.SUPERSEDE, AnswerKind.GIVE_UP])
+def test_a_person_answers_by_the_text_of_an_outcome(good, bad, kind):
+    machine, _ = tree(good, bad, ValueError('no arm'))
+    expert = FakeExpert(Answer(kind, outcome=str(bad)))
+    settings = {'policy': 'always_ask'}
+    assert OracleContainer.wrap(machine, settings=settings, expert=expert).execute() is bad
+
+
+def test_an_interface_supersedes_by_the_text_of_an_outcome():
+    machine, _ = tree(True, False, ValueError('no arm'))
+    expert = FakeExpert(
+        Answer(AnswerKind.INTERFACE, interface='by_hand'),
+        interface=lambda *given: Answer(AnswerKind.SUPERSEDE, outcome='False'),
+    )
+    settings = {
+        'policy': 'always_ask',
+        'expert': {'interfaces': {'by_hand': {'action': 'by_hand', 'states': ['A']}}},
+    }
+    assert OracleContainer.wrap(machine, settings=settings, expert=expert).execute() is False
+
+
+def test_an_end_counts_as_the_text_that_is_recorded():
+    assert FailureRule().meaning(False) is FailureRule().meaning('False') is EndMeaning.UNKNOWN
+    assert FailureRule(('2',)).meaning(2) is EndMeaning.FAILURE
+
+
+# -- labels
+
+
+def chain(labels, *script):
+    machine = smach.StateMachine(outcomes=['ok', 'aborted'])
+    states = [Scripted(*script, outcomes=('ok', 'aborted')), Scripted(outcomes=('ok', 'aborted'))]
+    with machine:
+        for label, state, after in zip(labels, states, (labels[1], 'ok')):
+            smach.StateMachine.add(label, state, {'ok': after})
+    return machine, states
+
+
+@pytest.mark.parametrize('labels', [(0, 1), (Seen.GOOD, Seen.BAD), ('A', 1)])
+def test_a_machine_with_a_label_that_is_no_text_is_refused_and_stays_bare(labels):
+    machine, _ = chain(labels)
+    with pytest.raises(LabelError, match='TASK: the label .* of a state is no text; allowed: text'):
+        OracleContainer.wrap(machine, name='TASK')
+    assert type(machine) is smach.StateMachine
+    assert machine.execute() == 'ok'
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What is warned of."""
+    heard = []
+    monkeypatch.setattr(smach, 'logwarn', heard.append)
+    return heard
+
+
+WHY = "the label 0 of a state is no text; allowed: text, such as '0'"
+
+
+def test_one_inside_of_others_is_tried_again_as_a_whole(told):
+    inner, states = chain((0, 1), 'ok', 'aborted')
+    states[1].script = ['aborted']
+    machine = smach.StateMachine(outcomes=['ok', 'aborted'])
+    with machine:
+        smach.StateMachine.add('IN', inner)
+    wrapped = OracleContainer.wrap(machine, name='TASK')
+    assert told == ['TASK/IN: it has no oracle of its own: ' + WHY]
+    assert wrapped.execute() == 'ok'
+    assert [each.runs for each in states] == [3, 2]
+    assert [row.state for row in wrapped.rates()] == ['IN']
+
+
+@pytest.mark.skipif(
+    bool(os.environ.get('SMACH_UPSTREAM')), reason='its Concurrence wants text as labels'
+)
+def test_a_concurrence_with_such_labels_has_no_oracle_within(told):
+    branches = [Scripted(*script, outcomes=('ok', 'aborted')) for script in ([], ['aborted'])]
+    beside = smach.Concurrence(['ok', 'aborted'], 'ok', outcome_map={'aborted': {1: 'aborted'}})
+    with beside:
+        for label, branch in enumerate(branches):
+            smach.Concurrence.add(label, branch)
+    machine = smach.StateMachine(outcomes=['ok', 'aborted'])
+    with machine:
+        smach.StateMachine.add('BESIDE', beside)
+    wrapped = OracleContainer.wrap(machine, name='TASK')
+    assert told == ['TASK/BESIDE: its states get no oracle: ' + WHY]
+    assert wrapped.execute() == 'ok'
+    assert [each.runs for each in branches] == [2, 2]
