@@ -127,6 +127,7 @@ class OracleContainer(smach.StateMachine):
         'succeeded'
 
         :raises SettingsError: naming key, value and what is allowed.
+        :raises LabelError: where a state has a label that is no text.
         """
         check_arguments(name, expert, recover, strict, health)
         checked = as_settings(settings, preconditions)

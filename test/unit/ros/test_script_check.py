@@ -140,6 +140,23 @@ def test_the_report_says_where_the_other_branches_may_have_a_failure_kept(check)
     assert meant in drive and unless not in ' '.join(drive.split())
 
 
+def test_the_report_says_which_machine_runs_without_an_oracle(check):
+    code, report, errors = check(
+        """
+        sm = machine(0, 1)
+        print('OUTCOME', sm.execute())
+    """
+    )
+    assert code == 0, errors
+    why = (
+        "Warning: TASK: the label 0 of a state is no text; allowed: text, such as '0'. It runs "
+        'without an oracle'
+    )
+    assert why in ' '.join(report.split())
+    assert '1 warning: no error in the settings for 1 machine.' in report
+    assert 'OUTCOME succeeded' in errors
+
+
 PARKS = """
     carry = smach.StateMachine(['done', 'left'])
     with carry:

@@ -6,7 +6,7 @@ from typing import Dict, List, Optional, Tuple, cast
 import smach
 
 from ..identity import own_attributes, renew_attributes
-from ..machine.nesting import WRAPPER, branching_below
+from ..machine.nesting import WRAPPER, branching_below, why_no_oracle
 from ..machine.tree_node import TreeNode
 from ..smach_private import Labels, set_mark
 from .branch import Branch
@@ -46,15 +46,15 @@ def _new_wrapper(
     parent: TreeNode, labels: Labels, container: smach.Container
 ) -> Optional[ContainerWrapper]:
     asks = asks_hook(type(container))
+    why_not = why_no_oracle(container)
     try:
-        if not asks:
+        if not (asks or why_not):
             have_asked(container)
     except TypeError as err:
-        smach.logwarn(
-            '{}/{}: its states get no oracle, since its class cannot be extended ({})'.format(
-                parent.path, '/'.join(labels), err
-            )
-        )
+        why_not = 'its class cannot be extended ({})'.format(err)
+    if why_not:
+        path = '/'.join((parent.path, *labels))
+        smach.logwarn('{}: its states get no oracle: {}'.format(path, why_not))
         return None
     kind = IteratorWrapper if isinstance(container, smach.Iterator) else ContainerWrapper
     wrapper = kind(container, parent, labels)

@@ -6,9 +6,9 @@ import smach
 
 from ..asking.question import names
 from ..branches.adopting import adopt_branches, release_branches
-from ..errors import SettingsError, TrialError
+from ..errors import LabelError, SettingsError, TrialError
 from ..identity import set_class
-from ..machine.nesting import holds_containers, machines_below, nodes_of
+from ..machine.nesting import holds_containers, machines_below, nodes_of, why_no_oracle
 from ..machine.oracle import load_rates
 from ..machine.tree import Tree
 from ..machine.tree_node import TreeNode, marked_node, node_of
@@ -39,9 +39,13 @@ def wrap_machine(
 
     :raises SettingsError: for what is no machine or cannot be wrapped, and for settings that do not
         fit it. A bare machine then stays bare.
+    :raises LabelError: for a label that is no text. Likewise.
     """
     if not isinstance(given, smach.StateMachine):
         raise SettingsError('machine', given, 'a smach.StateMachine')
+    why_not = why_no_oracle(given)
+    if why_not:
+        raise LabelError('{}: {}'.format(arguments.name or type(given).__name__, why_not))
     if isinstance(given, tree.container_class):
         return _wrap_again(given, tree, arguments)
     try:
@@ -136,6 +140,11 @@ def _adopt_below(parent: TreeNode, found: Dict[int, TreeNode]) -> None:
         node = node_of(child)
         if node is None:
             if not parent.wraps(below):
+                continue
+            why_not = why_no_oracle(child)
+            if why_not:
+                path = '/'.join((parent.path, *below))
+                smach.logwarn('{}: it has no oracle of its own: {}'.format(path, why_not))
                 continue
             tree = parent.tree
             node = _put_under(child, tree.container_class, tree, parent.settings, '')

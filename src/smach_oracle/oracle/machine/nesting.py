@@ -90,7 +90,7 @@ def children_of(container: object) -> Mapping[str, smach.State]:
 
 
 def containers_of(container: object) -> List[Tuple[str, smach.Container]]:
-    """Return those of its states that are containers, by label.
+    """Return those of its states that are containers, by label, where that is text.
 
     Another thread may add states meanwhile. A copy is one step to it. A list of pairs is not: each
     pair is a new object, for which Python may collect garbage, and that runs code.
@@ -98,8 +98,18 @@ def containers_of(container: object) -> List[Tuple[str, smach.Container]]:
     return [
         (label, state)
         for label, state in dict(children_of(container)).items()
-        if isinstance(state, smach.Container)
+        if isinstance(state, smach.Container) and isinstance(label, str)
     ]
+
+
+def why_no_oracle(container: smach.Container) -> str:
+    """Say which label of a container's states is no text, '' where all are."""
+    for label, state in dict(children_of(container)).items():
+        if not isinstance(label, str) and state is not None:
+            return 'the label {!r} of a state is no text; allowed: text, such as {!r}'.format(
+                label, str(label)
+            )
+    return ''
 
 
 def holds_containers(machine: smach.StateMachine) -> bool:

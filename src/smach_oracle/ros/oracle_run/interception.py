@@ -26,8 +26,8 @@ class Interception:
     machine that a state runs inside its own `execute`, or that a Concurrence or an Iterator at the
     top contains, is a top-level one.
 
-    :param wrap: swaps the machine's class. An error it raises surfaces from the machine's
-        `execute`.
+    :param wrap: swaps the machine's class, unless the machine cannot have an oracle. An error it
+        raises surfaces from the machine's `execute`.
     :param why_left: says what to warn of where the program has wrapped a machine itself, '' for
         nothing. That is said once.
     """
@@ -76,11 +76,14 @@ class Interception:
                 return isinstance(machine, OracleContainer)
             with seen_to_run(machine):  # its program may wait for its end already
                 self._wrap(machine)
+            if not isinstance(machine, OracleContainer):  # those in it are wrapped by themselves
+                self._left_bare[machine] = True
+                return False
             self._wrapped[machine] = True
             for child in machines_inside(machine):
                 if not isinstance(child, OracleContainer):
                     self._left_bare[child] = True
-        return isinstance(machine, OracleContainer)
+        return True
 
     def _leave(self, machine: smach.StateMachine) -> None:
         """Warn once where it is the program that has wrapped a machine."""

@@ -3,7 +3,7 @@
 import functools
 import threading
 from contextlib import ExitStack
-from typing import Any, Callable, Iterable, Iterator, List, Sequence, Tuple, Type, cast
+from typing import Any, Callable, Iterable, Iterator, List, Sequence, Tuple, Type
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -94,7 +94,11 @@ class MachineCheck:
             is_left = isinstance(machine, OracleContainer)
             if not is_left:
                 self._wrap(machine)
-            name = _prepare(cast('OracleContainer', machine), running, self._names.complain)
+            if not isinstance(machine, OracleContainer):
+                self.machines += 1
+                self._warn(warnings)
+                return
+            name = _prepare(machine, running, self._names.complain)
             if is_left:
                 warnings.extend(filter(None, [self._why_left(machine)]))
         self._names.note(sorted_preconditions(machine, oracle_of(machine).settings).placed)

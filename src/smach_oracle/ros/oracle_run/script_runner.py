@@ -15,7 +15,7 @@ from typing import Callable, Iterator, Optional, Sequence
 
 import smach
 from smach_oracle.oracle import oracle_of
-from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.errors import LabelError, SettingsError
 from smach_oracle.oracle.settings.names import UnfitKind, UnfitName
 from smach_oracle.oracle.settings.paths import check_writable
 from smach_oracle.oracle.settings.settings import GROUPS, Settings
@@ -143,7 +143,7 @@ class MachineWrapper:
         )
 
     def wrap(self, machine: smach.StateMachine) -> None:
-        """Swap the machine's class.
+        """Swap the machine's class, unless it cannot have an oracle. That is warned of.
 
         :raises SettingsError: where the settings do not fit the machine.
         """
@@ -160,14 +160,18 @@ class MachineWrapper:
             if self._invocation.recover:
                 for problem in sorted_preconditions(machine, settings).misplaced:
                     complain(UnfitName(problem, str(problem.value), UnfitKind.MISPLACED))
-            OracleContainer.wrap(
-                machine,
-                settings=settings,
-                nested=settings.nested,
-                name=machine_names().name_of(machine),
-                strict=complain,
-                recover=self._invocation.recover,
-            )
+            try:
+                OracleContainer.wrap(
+                    machine,
+                    settings=settings,
+                    nested=settings.nested,
+                    name=machine_names().name_of(machine),
+                    strict=complain,
+                    recover=self._invocation.recover,
+                )
+            except LabelError as err:
+                smach.logwarn('{}. It runs without an oracle'.format(err))
+                return
             self._is_first = False
 
 
