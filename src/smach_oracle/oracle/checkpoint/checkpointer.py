@@ -193,8 +193,7 @@ class Checkpointer:
                 and not (event.kind is EventKind.SUPERSEDE and _is_on_its_way(node))
             )
             or event.seq >= self._seq_stored + SEQ_RESERVE
-            # a precondition is told as a target, too, and may have the same name
-            or (event.kind is EventKind.TRANSITION and node.is_oracle(event.target))
+            or _gives_way(event, node)
         )
 
     def _pending_of(self, node: TreeNode) -> List[Fact]:
@@ -372,6 +371,10 @@ class Checkpointer:
         facts += self._spent()
         facts += self._start()
         facts += self._marks()
+        if self._top.settings.rates_file and _gives_way(event, node):
+            # that file has just got what all states have learned, and is not to get it once more
+            for each in self._nodes.values():
+                facts += self._facts_of(each).states()
         self._pending_of(node).clear()
         for each in self._entered.pop(_begins_line(node), ()):
             facts += self._keys_around(each)
@@ -468,6 +471,14 @@ def _begins_line(node: TreeNode) -> str:
 def _closes(event: Event) -> bool:
     """Whether a question is over: also by an interface that has done the work."""
     return event.kind in _CLOSES or (event.kind is EventKind.INTERFACE_END and bool(event.outcome))
+
+
+def _gives_way(event: Event, node: TreeNode) -> bool:
+    """Whether a state that has failed gives way to the oracle.
+
+    A precondition is told as a target, too, and may have the same name.
+    """
+    return event.kind is EventKind.TRANSITION and node.is_oracle(event.target)
 
 
 def must_stop(node: TreeNode) -> bool:

@@ -80,6 +80,13 @@ class ContainerFacts:
         yield from self._new_visits(history)
         yield from self._if_new(HISTORY, history.told())
         yield from self.streaks()
+        yield from self._states(labels)
+
+    def states(self) -> Iterator[Fact]:
+        """Yield what is new of every state, and nothing of the visits."""
+        yield from self._states(list(self._records.by_label))
+
+    def _states(self, labels: List[str]) -> Iterator[Fact]:
         for label in labels:
             record = self._records.by_label.get(label)
             if record is not None:
