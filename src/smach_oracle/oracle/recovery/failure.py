@@ -112,7 +112,9 @@ def judge(
     if isinstance(judged, Route):
         return judged
     items = items_under_way(node)
-    return judged._replace(text='; '.join(filter(None, (judged.text, items)))) if items else judged
+    if judged.text.endswith(items):  # it was told before the program was stopped
+        return judged
+    return judged._replace(text='; '.join(filter(None, (judged.text, items))))
 
 
 def _judge(
