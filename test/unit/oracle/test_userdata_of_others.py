@@ -1,7 +1,7 @@
 """A jump leaves alone what another part of the program writes into the userdata."""
 
 import pytest
-from machines import FakeExpert, Scripted, Watched, chain_of, goto
+from machines import FakeExpert, Scripted, Watched, chain_of, contents, goto
 
 import smach
 
@@ -97,3 +97,46 @@ def test_the_state_of_an_iterator_has_all_keys_in_its_hands():
     drive.script += [asks_to_stop(iterator), lambda state, ud: seen.append(ud.stop) or 'ok']
     Watched(top).run()
     assert seen == [False]
+
+
+def asks_meanwhile(machine):
+    """A precondition that is not met, and writes. Meanwhile a callback comes."""
+
+    def look(ud):
+        ud.found = 'nothing'
+        machine.userdata.stop = True
+        return False
+
+    return look
+
+
+@pytest.mark.parametrize('begins_with', [{'stop': False}, {}])
+def test_what_comes_while_an_unmet_precondition_runs_stays(begins_with):
+    drive, seen = Scripted('aborted', lambda state, ud: seen.append(sees(ud)) or 'ok', **INPUT), []
+    machine = chain_of(drive)
+    for key, value in begins_with.items():
+        machine.userdata[key] = value
+    preconditions = {'A': [asks_meanwhile(machine)]}
+    assert Watched(machine, preconditions=preconditions).run() == 'done'
+    assert seen == [True]
+    assert contents(machine.userdata) == {'stop': True}
+
+
+def test_what_a_state_within_has_written_as_a_precondition_is_taken_back():
+    look = Scripted(asks_to_find, output_keys=['found'])
+    machine = chain_of(Scripted('aborted'), look)
+    assert Watched(machine, preconditions={'A': ['B']}).run() == 'done'
+    assert look.runs == 2 and contents(machine.userdata) == {}
+
+
+def asks_to_find(state, ud):
+    ud.found = 'nothing'
+    return 'aborted'
+
+
+def test_a_restart_leaves_it_too():
+    drive, seen = Scripted(**INPUT), []
+    machine = chain_of(drive)
+    machine.userdata.stop = False
+    run(machine, drive, seen, settings={'policy': 'restart'})
+    assert seen == [True]

@@ -102,7 +102,10 @@ def start_over(node: TreeNode, target: str) -> Dict[str, object]:
     for each in nodes_of(node.machine):
         userdata = restarts.userdata.get(each)
         if userdata is not None:
-            restore(data_of(each.machine.userdata), userdata, (), each.in_force.deep_copy_keys)
+            deep = each.in_force.deep_copy_keys
+            # those in it get their input keys as they begin
+            stay = keys_of_others(each.machine, userdata, deep) if each is node else ()
+            restore(data_of(each.machine.userdata), userdata, stay, deep)
     leave_for(node, target)
     ask_to_go_on(node, target)
     return plain_entry(node, target, 'start')

@@ -194,7 +194,8 @@ class WriteWatch:
     def take_back(self, begun: UserdataMark) -> None:
         """Make the userdata what it was. It no longer counts as written.
 
-        Objects that were changed inside stay changed, except the deep-copied keys.
+        Objects that were changed inside stay changed, except the deep-copied keys. So does what
+        another part of the program has written meanwhile.
         """
         data = data_of(self._machine.userdata)
         if own_mark(self._machine, 'shares_userdata'):
@@ -204,10 +205,9 @@ class WriteWatch:
             if key in begun.prints and fingerprint(value) != begun.prints[key]:
                 if self._before.get(key) is value:
                     self._before[key] = begun.copies[key]
-                value = begun.copies[key]
-            data[key] = value
-        for key in set(data).difference(begun.data):
-            del data[key]
+                begun.data[key] = begun.copies[key]
+        others = keys_of_others(self._machine, begun.data, self._deep)
+        restore(data, begun.data, others.difference(self.gate.written), ())
         self.gate.written.clear()
 
     def take_back_own(self, begun: UserdataMark) -> None:

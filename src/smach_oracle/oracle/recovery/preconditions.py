@@ -230,8 +230,9 @@ class _Elsewhere:
         self._runs = not way.entered_places[1:]
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
-        below = [data_of(link.inner_container.userdata) for link in self._down[:-1]]
-        self._before = [(data, dict(data)) for data in below]
+        below = [data_of(link.inner_container.userdata) for link in self._down]
+        self._before = [(data, dict(data)) for data in below[:-1]]
+        self._before += [(data, self._begun.data) for data in below[-1:]]
         self.gate = self._watch.gate
         for link in self._down:
             hand_down(link)
@@ -242,7 +243,7 @@ class _Elsewhere:
             self._watch.take_back_own(self._begun)
             return
         self._watch.take_back(self._begun)
-        for data, before in self._before:
+        for data, before in self._before:  # without what was handed down
             data.clear()
             data.update(before)
 
