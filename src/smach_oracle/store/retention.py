@@ -3,7 +3,7 @@
 import json
 import re
 import sqlite3
-from typing import Dict, Iterable, List, NamedTuple, Set
+from typing import Counter, Dict, Iterable, Iterator, List, NamedTuple, Set, Union
 
 from .errors import StoreError
 from .holding import MachineLock
@@ -40,14 +40,15 @@ class Retention:
         trials = sorted(self._store.trials(), key=lambda trial: trial.ended or trial.begun)
         asked = self._asked(trials)
         with transaction(self._store, keep=False) as database:
+            shared = _Shared(database) if self._size else None
             for trial in trials:
                 why = self._why(database, trial, now)
                 if not why:
                     continue
                 stays = TELLS_IT if trial.number in asked else self._why_kept(trial)
                 (self.kept if stays else self.going).append(Dropped(trial, stays or why))
-                if not stays and self._size:
-                    _take_out(database, [trial.number])
+                if not stays and shared is not None:
+                    shared.take_out([trial.number])
 
     def _asked(self, trials: Iterable[StoredTrial]) -> Set[int]:
         """Return the latest trial of each machine since trials may have been lost.
@@ -94,7 +95,7 @@ class Retention:
                     each.trial.number for each in self.going if each.trial.machine == machine
                 ]
             with transaction(self._store) as database:
-                _take_out(database, numbers)
+                _Shared(database).take_out(numbers)
         finally:
             for lock in locks:
                 lock.release()
@@ -110,50 +111,82 @@ def size_of(database: sqlite3.Connection) -> int:
     return int((pages - free) * size)
 
 
-def _take_out(database: sqlite3.Connection, trials: Iterable[int]) -> None:
-    structures = set()
-    for number in trials:  # each has ended: see `_why_kept`
-        structures.update(_structures(database, number))
-        database.execute(
-            'DELETE FROM facts WHERE moment IN (SELECT number FROM moments WHERE trial = ?)',
-            (number,),
-        )
-        database.execute('DELETE FROM moments WHERE trial = ?', (number,))
-        database.execute('DELETE FROM trials WHERE number = ?', (number,))
-    if structures:
-        left = {
-            each
-            for (trial,) in database.execute('SELECT number FROM trials').fetchall()
-            for each in _structures(database, trial)
+class _Shared:
+    """What trials share: structures by their ids, parts of values by their digests.
+
+    All facts are looked through once, since thousands of trials may go.
+    """
+
+    def __init__(self, database: sqlite3.Connection) -> None:
+        self._database = database
+        self._of: Dict[int, Set[Union[str, bytes]]] = {}  # by trial
+        for trial, structure in database.execute('SELECT number, structure FROM trials'):
+            self._of[trial] = {str(structure)}
+        self._find_structures()
+        self._find_parts()
+        self._uses = Counter(each for found in self._of.values() for each in found)
+        # what nothing refers to: parts that an earlier program has added, and a later one thinned
+        self._unused: Set[Union[str, bytes]] = {
+            digest
+            for (digest,) in database.execute('SELECT digest FROM parts')
+            if digest not in self._uses
         }
-        database.executemany(
-            'DELETE FROM structures WHERE id = ?', [(each,) for each in structures - left]
-        )
-    used = used_parts(database)
-    for (digest,) in database.execute('SELECT digest FROM parts').fetchall():
-        if bytes(digest) not in used:
-            database.execute('DELETE FROM parts WHERE digest = ?', (digest,))
+
+    def _find_structures(self) -> None:
+        """Find those with which a trial has gone on: its script may have changed."""
+        for trial, name, text in self._database.execute(
+            'SELECT trial, name, text FROM facts JOIN moments ON moment = moments.number '
+            "WHERE facts.path = '' AND name IN (?, ?) AND text IS NOT NULL",
+            (STRUCTURE, RENAMED),
+        ):
+            self._of.setdefault(trial, set()).add(
+                str(json.loads(text))
+                if name == STRUCTURE
+                else told_renaming(StoredValue(text, None))[0]
+            )
+
+    def _find_parts(self) -> None:
+        for trial, text in self._database.execute(
+            'SELECT trial, text FROM facts JOIN moments ON moment = moments.number '
+            "WHERE text LIKE '%$part%'"
+        ):
+            self._of.setdefault(trial, set()).update(_parts_in(text))
+        within: Dict[bytes, Set[bytes]] = {}
+        for trial, digest in self._database.execute(
+            'SELECT DISTINCT trial, whole FROM facts JOIN moments ON moment = moments.number '
+            'WHERE whole IS NOT NULL'
+        ):
+            if digest not in within:
+                within[digest] = {digest, *_parts_within(self._database, digest)}
+            self._of.setdefault(trial, set()).update(within[digest])
+
+    def take_out(self, trials: Iterable[int]) -> None:
+        """Take out trials that have ended, and what no other trial refers to."""
+        for number in trials:  # each has ended: see `_why_kept`
+            self._database.execute(
+                'DELETE FROM facts WHERE moment IN (SELECT number FROM moments WHERE trial = ?)',
+                (number,),
+            )
+            self._database.execute('DELETE FROM moments WHERE trial = ?', (number,))
+            self._database.execute('DELETE FROM trials WHERE number = ?', (number,))
+            found = self._of.pop(number, set())
+            self._uses.subtract(found)
+            self._unused.update(each for each in found if not self._uses[each])
+        for each in self._unused:
+            self._database.execute('DELETE FROM structures WHERE id = ?', (each,))
+            self._database.execute('DELETE FROM parts WHERE digest = ?', (each,))
+        self._unused.clear()
 
 
-def _structures(database: sqlite3.Connection, trial: int) -> Set[str]:
-    """Return the ids of the structures of a trial: it may have gone on with a changed script."""
-    found = {
-        str(structure)
-        for (structure,) in database.execute(
-            'SELECT structure FROM trials WHERE number = ?', (trial,)
-        )
-    }
-    for name, text in database.execute(
-        'SELECT name, text FROM facts JOIN moments ON moment = moments.number WHERE trial = ? '
-        "AND facts.path = '' AND name IN (?, ?) AND text IS NOT NULL",
-        (trial, STRUCTURE, RENAMED),
-    ):
-        found.add(
-            str(json.loads(text))
-            if name == STRUCTURE
-            else told_renaming(StoredValue(text, None))[0]
-        )
-    return found
+def _parts_in(text: str) -> Iterator[bytes]:
+    """Yield the digests of the parts to which a text refers."""
+    return map(bytes.fromhex, _PART.findall(text))
+
+
+def _parts_within(database: sqlite3.Connection, digest: bytes) -> Iterator[bytes]:
+    """Yield those to which a value refers that is a part as a whole."""
+    for (data,) in database.execute('SELECT data FROM parts WHERE digest = ?', (digest,)):
+        yield from _parts_in(bytes(data).decode('ascii', 'replace'))
 
 
 def used_parts(database: sqlite3.Connection, since: int = 0) -> Set[bytes]:
@@ -165,14 +198,12 @@ def used_parts(database: sqlite3.Connection, since: int = 0) -> Set[bytes]:
     for (text,) in database.execute(
         "SELECT text FROM facts WHERE moment >= ? AND text LIKE '%$part%'", (since,)
     ):
-        used.update(map(bytes.fromhex, _PART.findall(text)))
+        used.update(_parts_in(text))
     wholes = database.execute(
         'SELECT DISTINCT whole FROM facts WHERE moment >= ? AND whole IS NOT NULL', (since,)
     ).fetchall()
     for (digest,) in wholes:
-        used.add(bytes(digest))
-        for (data,) in database.execute('SELECT data FROM parts WHERE digest = ?', (digest,)):
-            used.update(map(bytes.fromhex, _PART.findall(bytes(data).decode('ascii', 'replace'))))
+        used.update((bytes(digest), *_parts_within(database, digest)))
     return used
 
 

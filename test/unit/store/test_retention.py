@@ -80,6 +80,25 @@ def test_the_oldest_go_until_the_store_is_small_enough(store):
     assert names(store) == ['trial-3', 'trial-5']
 
 
+def test_the_facts_are_looked_through_once_however_many_trials_go(store):
+    for number in range(40):
+        add(store, 'trial-{}'.format(number), 90 - number, [bytes([number]) * 20000, 'y' * 300])
+    done = []
+    store._db.set_trace_callback(done.append)
+    retention = Retention(store, size=400000)
+    retention.plan(NOW)
+    store._db.set_trace_callback(None)
+    assert 15 < len(retention.going) < 35
+    assert sum('LIKE' in each for each in done) == 1
+
+
+def test_parts_that_an_earlier_program_has_left_go_as_well(store):
+    add(store, 'old', 40, [b'i' * 5000])
+    store._db.execute('INSERT INTO parts VALUES (?, ?)', (b'left', b'x' * 5000))
+    dropped(store, days=30)
+    assert store._db.execute('SELECT count(*) FROM parts').fetchone() == (0,)
+
+
 def test_the_structure_that_a_trial_went_on_with_stays(store):
     add(store, 'old', 40, structure='before')
     trial = add(store, 'stopped', structure='first')
