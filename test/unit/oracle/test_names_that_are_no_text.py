@@ -74,6 +74,23 @@ def test_a_machine_given_up_ends_in_the_outcome_itself(ends):
     assert OracleContainer.wrap(machine).execute() is ends[1]
 
 
+@pytest.mark.parametrize('ends', [(1, 2), (1, 0), (True, False)])
+def test_so_does_one_that_is_only_observed(ends):
+    machine, _ = tree('succeeded', 'aborted', 'aborted', ends=ends)
+    assert OracleContainer.wrap(machine, recover=False).execute() is ends[1]
+
+
+@pytest.mark.parametrize('ends', [(1, 2), (1, 0), (True, False)])
+def test_so_does_one_that_is_preempted(ends):
+    def preempt(state, userdata):
+        machine.request_preempt()
+        return 'aborted'
+
+    machine, runs = tree('succeeded', 'aborted', ends=ends)
+    machine.get_children()['A'].script = [preempt]
+    assert OracleContainer.wrap(machine).execute() is ends[1] and not runs
+
+
 @pytest.mark.parametrize('good, bad', NAMES)
 @pytest.mark.parametrize('kind', [AnswerKind.SUPERSEDE, AnswerKind.GIVE_UP])
 def test_a_person_answers_by_the_text_of_an_outcome(good, bad, kind):

@@ -41,7 +41,8 @@ from ..smach_private import remapping_of, states_of
 from .stored_tree import StoredContainer
 
 _NOTHING: Dict[str, object] = {}
-_as_json = json.JSONEncoder(separators=(',', ':')).encode
+# an outcome that is no text is kept as its text
+_as_json = json.JSONEncoder(separators=(',', ':'), default=text_of).encode
 
 
 def fact_of(path: str, name: str, plain: object) -> Fact:

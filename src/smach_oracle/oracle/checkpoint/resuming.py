@@ -14,6 +14,7 @@ from ..machine.nesting import branching_below, children_of, nodes_of
 from ..machine.places import JumpPath, TreePlace, jump_path_to, place_named, places_of
 from ..machine.repeats import begin_once_more, leave_unconfirmed, why_held_back
 from ..machine.resumed import NOT_BEGUN, Unfinished
+from ..machine.site import outcome_told
 from ..machine.state_record import StateRecord
 from ..machine.tree_node import TreeNode, node_of
 from ..records.events import FailureKind
@@ -123,8 +124,13 @@ class EntryPoint:
         """Have the visits of the execution that was stopped."""
         node, stored = self._node, self._stored
         if stored.history:
+            visits, states = stored.visits, states_of(node.machine)
+            for number, visit in enumerate(visits):
+                if node.has(visit.state):
+                    outcomes = states[visit.state].get_registered_outcomes()
+                    visits[number] = visit._replace(outcome=outcome_told(outcomes, visit.outcome))
             node.records.history.take_over(
-                stored.visits, stored.visits_of_execution, stored.history, node.has
+                visits, stored.visits_of_execution, stored.history, node.has
             )
 
     def enter(self) -> None:
@@ -375,8 +381,10 @@ class _Setting:
         """
         stored = self._resumption.tree.container(node.key)
         if stored.phase == ENDED:
-            if stored.label in node.machine.get_registered_outcomes():
-                self._resumed.had_ended(node.records, stored.label)
+            outcomes = node.machine.get_registered_outcomes()
+            outcome = outcome_told(outcomes, stored.label)
+            if outcome in outcomes:
+                self._resumed.had_ended(node.records, outcome)
                 return False
             self.ask_at_beginning(node, stored, 'outcome ' + stored.label)
         elif stored.phase:
@@ -445,8 +453,10 @@ class _Setting:
         snapshots = self._resumption.tree.container(node.path).snapshots
         kind, outcome, text = FailureKind.INTERRUPTED, '', STOPPED
         if stored.phase == FAILED:
-            number, outcome, text = cast('Tuple[int, str, str]', stored.at[2:5])
-            if outcome and outcome not in transitions_of(node.machine).get(stored.label, ()):
+            number, told, text = cast('Tuple[int, str, str]', stored.at[2:5])
+            drawn = transitions_of(node.machine).get(stored.label, {})
+            outcome = outcome_told(drawn, told)
+            if outcome != '' and outcome not in drawn:
                 outcome, text = '', GONE.format('outcome ' + outcome)
             else:
                 kind = FailureKind(number)

@@ -367,7 +367,7 @@ class Step:
                 smach.logerr("State '{}' ended in an error.".format(self._record.label))
             raise ending.error
         target = ending.outcome if ending.state is None else ending.state
-        route = Route(str(target), ending.state is not None)
+        route = Route(cast('str', target), ending.state is not None)
         return self._advance(failure.outcome, route, facts=facts)
 
     def _advance(

@@ -1,6 +1,6 @@
 """The place where the states of a wrapped container run, and where outcomes lead there."""
 
-from typing import TYPE_CHECKING, NamedTuple, Optional, Tuple, cast
+from typing import TYPE_CHECKING, Iterable, NamedTuple, Optional, Tuple, cast
 
 import smach
 
@@ -42,6 +42,12 @@ def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
         if name is not None and name in container_outcomes:
             return Route(name, False)
     return Route('', False)
+
+
+def outcome_told(outcomes: Iterable[str], told: object) -> str:
+    """Return the outcome of which a record has the text, that text where there is none."""
+    text = str(told)
+    return next((each for each in outcomes if str(each) == text), text)
 
 
 def failure_kind(

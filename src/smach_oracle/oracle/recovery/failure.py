@@ -216,7 +216,7 @@ def _once(make: Callable[[], Exception]) -> Callable[[], Exception]:
 def _failure_before(node: TreeNode, label: str, before: Unfinished) -> Failure:
     """Return the failure of a visit that was begun before the program was stopped."""
     failure = Failure(label, before.kind, before.outcome, before.text)
-    if before.outcome:
+    if before.outcome != '':
         route = route_of(node.machine, label, before.outcome)
         if route.leads_on:
             return failure._replace(route=route)
