@@ -214,16 +214,25 @@ class StoreFile:
 
         :raises StoreDamaged: where it cannot be read.
         """
-        chosen, given = ('', ()) if machine is None else ('WHERE machine = ? ', (machine,))
-        return [
-            StoredTrial(*row)
-            for row in self._read(
-                'SELECT number, machine, trial_id, structure, begun, ended, outcome, '
-                '(SELECT count(*) FROM moments WHERE trial = trials.number) '
-                'FROM trials {}ORDER BY number'.format(chosen),
-                given,
-            )
-        ]
+        if machine is None:
+            return list(self._trials('ORDER BY number'))
+        return list(self._trials('WHERE machine = ? ORDER BY number', machine))
+
+    def latest_trial(self, machine: str) -> Optional[StoredTrial]:
+        """Return the latest trial of a machine, None where it has none. It may have thousands.
+
+        :raises StoreDamaged: where it cannot be read.
+        """
+        latest = 'WHERE machine = ? ORDER BY number DESC LIMIT 1'
+        return next(self._trials(latest, machine), None)
+
+    def _trials(self, which: str, *given: object) -> Iterator[StoredTrial]:
+        for row in self._read(
+            'SELECT number, machine, trial_id, structure, begun, ended, outcome, '
+            '(SELECT count(*) FROM moments WHERE trial = trials.number) FROM trials ' + which,
+            given,
+        ):
+            yield StoredTrial(*row)
 
     def lost_until(self) -> Optional[int]:
         """Return the number of the trial behind which others may be lost. None: none is lost.
@@ -252,7 +261,7 @@ class StoreFile:
     def trial_of(self, moment: int) -> Optional[StoredTrial]:
         """Return the trial of a moment, None where there is no such moment."""
         for (number,) in self._read('SELECT trial FROM moments WHERE number = ?', (moment,)):
-            return next(each for each in self.trials() if each.number == number)
+            return next(self._trials('WHERE number = ?', number))
         return None
 
     def facts(self, trial: int, until: Optional[int] = None) -> Iterator[StoredFact]:

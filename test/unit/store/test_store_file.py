@@ -104,6 +104,21 @@ def test_a_trial_that_has_ended_says_so(path):
     assert store.trials()[0][5:7] == (9.0, 'succeeded')
 
 
+def test_the_latest_trial_of_a_machine_is_read_alone(path):
+    store = StoreFile(path)
+    for name, machine in (('first', 'TASK'), ('second', 'TASK'), ('third', 'OTHER')):
+        store.begin_trial(TRIAL._replace(machine=machine, trial_id=name))
+    assert store.latest_trial('TASK') == store.trials('TASK')[-1] == store.trials()[1]
+    assert store.latest_trial('NONE') is None
+    plans = []
+    store._db.set_trace_callback(plans.append)
+    store.latest_trial('TASK')
+    store._db.set_trace_callback(None)
+    (told,) = plans
+    steps = [row[3] for row in store._db.execute('EXPLAIN QUERY PLAN ' + told)]
+    assert 'trials_of' in steps[0] and not any('SORT' in each.upper() for each in steps), steps
+
+
 def test_an_edit_is_logged(path):
     store = StoreFile(path)
     number = store.begin_trial(TRIAL)

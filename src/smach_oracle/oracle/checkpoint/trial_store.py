@@ -105,8 +105,7 @@ class TrialStore:
             return self._to_resume()
 
     def _to_resume(self) -> Optional[Resumption]:
-        trials = self._store.trials(self._top.name)
-        last = self._instead_of_lost(trials[-1] if trials else None)
+        last = self._instead_of_lost(self._store.latest_trial(self._top.name))
         if last is None or last.ended is not None or not last.moments:
             self._earlier_moment(None)
             smach.loginfo(
@@ -166,7 +165,7 @@ class TrialStore:
             NewTrial(self._top.name, new_id(), (*self._structure,), now)
         )
         self._store.add(number, [NewMoment(now, -1, BROKEN, self._top.key, '', ())])
-        return self._store.trials(self._top.name)[-1]
+        return self._store.latest_trial(self._top.name)
 
     def _earlier_moment(self, unfinished: Optional[StoredTrial]) -> int:
         """Return the number of the moment that the settings name, 0 for the last one.

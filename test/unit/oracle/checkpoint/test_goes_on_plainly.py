@@ -8,6 +8,7 @@ from killed_machines import Diary, in_a_process
 
 import smach
 from smach_oracle.oracle import OperatorHand, OracleContainer
+from smach_oracle.store.store_file import StoreFile
 
 
 @pytest.fixture
@@ -48,6 +49,16 @@ def test_without_an_oracle_a_trial_goes_on_between_two_states(tmp_path, shutdown
         assert machine.execute() == outcome
         shutdown.clear()
     assert diary.count('begins') == {'A': 1, 'B': 1}
+
+
+def test_a_trial_begins_without_a_look_at_all_before_it(tmp_path, monkeypatch):
+    def count_them(_, machine=None):
+        raise AssertionError('there may be thousands')
+
+    monkeypatch.setattr(StoreFile, 'trials', count_them)
+    machine = chain(A=noted(Diary(str(tmp_path / 'diary')), 'A'))
+    OracleContainer.wrap(machine, name='TOP', settings={'checkpoint': str(tmp_path / 'robot.db')})
+    assert [machine.execute() for _ in range(3)] == ['ok'] * 3
 
 
 def test_a_container_to_which_a_state_has_moved_is_done_once_it_has_run(tmp_path):
