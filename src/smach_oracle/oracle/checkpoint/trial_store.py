@@ -299,7 +299,8 @@ class TrialStore:
         self._observe_no_more()
         if self._observer is not None:
             self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
-        self._close(None if self.can_go_on(why) else Ending(at, outcome))
+        told = outcome if isinstance(outcome, str) else str(outcome)
+        self._close(None if self.can_go_on(why) else Ending(at, told))
 
     def let_go(self) -> None:
         """Let go of the store, as its trial does not begin. What it holds can still go on."""

@@ -10,6 +10,7 @@ from killed_machines import Diary, in_a_process
 
 import smach
 from smach_oracle.oracle import OracleContainer
+from smach_oracle.store.store_file import StoreFile
 
 
 class Seen(enum.Enum):
@@ -57,6 +58,11 @@ class Program:
         return in_a_process(program), self.diary.count('begins')
 
 
+def ends(folder):
+    """The outcomes of the stored trials."""
+    return [trial.outcome for trial in StoreFile(str(folder / 'robot.db')).trials('TOP')]
+
+
 def nested(folder, names, dies_in=''):
     program = Program(folder, *names, dies_in)
     inner = program.chain(B=program.state('B'), C=program.state('C'))
@@ -70,6 +76,7 @@ def test_a_trial_goes_on_where_it_stood(tmp_path, names, dies_in):
     outcome, begun = nested(tmp_path, names)
     assert outcome == repr(names[0])
     assert begun == {label: 2 if label == dies_in else 1 for label in 'ABCD'}
+    assert ends(tmp_path) == [str(names[0])]
 
 
 def beside(folder, names, dies_in=''):
