@@ -220,9 +220,7 @@ class OperatorHand:
         else:
             node.machine.set_initial_state([state])
             text = '{} does not run; it will begin in {}'.format(node.path, state)
-        return self._told(
-            'go_to', text + _in_spite_of(prospect), by, '{}/{}'.format(node.path, state)
-        )
+        return self._told('go_to', text + _in_spite_of(prospect), by, '/'.join((node.path, state)))
 
     def send(self, state: str, by: str, written: Sequence[str] = ()) -> bool:
         """Send this machine to a state for somebody who hears no answer, such as a viewer.
@@ -315,7 +313,7 @@ class OperatorHand:
 
     def _states_meant(self, pattern: PathPattern) -> str:
         found = [
-            '{}/{}'.format(node.path, label)
+            '/'.join((node.path, label))
             for node in nodes_of(self._top.machine)
             for label in node.labels()
             if pattern.matches(node.path, label)

@@ -227,7 +227,7 @@ def _guarded(node: TreeNode) -> Iterator[str]:
         below = each.path[len(node.path) + 1 :]
         for label in each.labels():
             if each.settings_of(label).on_retry != ALLOW:
-                yield '{}/{}'.format(below, label) if below else label
+                yield '/'.join((below, label)) if below else label
 
 
 def _state(node: TreeNode, label: str, decides: bool, unguarded: Unguarded) -> StateProspect:

@@ -9,7 +9,8 @@ def sendable_text(value: object) -> str:
     An exception's text may hold halves of surrogate pairs (from a file name, say). rospy would send
     the message up to there and garble the connection for the messages that follow.
     """
-    text = value if type(value) is str else text_of(value)
+    # a label may be a member of an Enum that is text, too
+    text = str.__str__(value) if isinstance(value, str) else text_of(value)
     if text.isascii():
         return text
     return text.encode('utf-8', 'backslashreplace').decode('utf-8')

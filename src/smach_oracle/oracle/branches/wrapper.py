@@ -215,7 +215,7 @@ def wrappers_around(node: TreeNode) -> List[Tuple[str, ContainerWrapper]]:
         return []
     path, found = cast('TreeNode', node.parent).key, []
     for link in links_to(node):
-        path = '{}/{}'.format(path, link.label)
+        path = '/'.join((path, link.label))
         wrapper = wrapper_of(link.inner_container)
         if wrapper is not None:  # the last label of a nested machine is its own
             found.append((path, wrapper))

@@ -168,7 +168,7 @@ class Checkpointer:
         if event.state:
             self._ran.setdefault(node.key, set()).add(event.state)
             if event.kind in _HAS_RUN:
-                self._wrote[node.path] = '{}/{}'.format(node.path, event.state)
+                self._wrote[node.path] = '/'.join((node.path, event.state))
         if event.kind is EventKind.CONTAINER_START and not self._enters_again(node):
             pending += self._facts_of(node).begin_execution()
         if event.kind is node.site.begins_by:
@@ -266,7 +266,7 @@ class Checkpointer:
         return known
 
     def _known_node(self, path: str, label: str) -> Optional[TreeNode]:
-        for key in ('{}/{}'.format(path, label), path):
+        for key in ('/'.join((path, label)), path):
             node = self._nodes.get(key)
             if node is not None and node.path == path:
                 return node
@@ -293,7 +293,7 @@ class Checkpointer:
         """Yield where the container stands after an event."""
         kind, label, data = event.kind, event.state, event.data or {}
         if kind is EventKind.STATE_START:
-            path = '{}/{}'.format(node.key, label)
+            path = '/'.join((node.key, label))
             is_container = isinstance(states_of(node.machine).get(label), smach.Container)
             below = self._below(path) if is_container else []
             sent_to = [

@@ -299,7 +299,7 @@ class _Setting:
     def activate(self, node: TreeNode) -> None:
         """Set a container that was under way, and what is in its state."""
         stored = self._resumption.tree.container(node.key)
-        key = '{}/{}'.format(node.key, stored.label)
+        key = '/'.join((node.key, stored.label))
         if stored.phase == IN and all(one.key != key for one in self._nodes):
             moved = self._resumption.tree.container(key)  # the container that was left is gone
         else:

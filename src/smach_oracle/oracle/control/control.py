@@ -103,7 +103,7 @@ class Jump(NamedTuple):
 
     def named(self) -> str:
         """Return the state, with the path of its container where that is another one."""
-        return '{}/{}'.format(self.container, self.state) if self.container else self.state
+        return '/'.join((self.container, self.state)) if self.container else self.state
 
 
 class StandingOrders(NamedTuple):

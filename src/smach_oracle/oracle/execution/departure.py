@@ -35,7 +35,7 @@ def depart(node: TreeNode, label: str, verdict: Verdict, level: TreeNode) -> boo
     levels = [node, *levels_above(node)]
     if level not in levels:
         return False
-    departure = Departure(verdict, level, '{}/{}'.format(node.path, label))
+    departure = Departure(verdict, level, '/'.join((node.path, label)))
     nodes = levels[: levels.index(level) + 1]
     others, leaving = _claim(nodes, departure)
     if others:
@@ -113,7 +113,7 @@ def _container_apart(
         return None
     path, below = others[0].path, nodes[-len(others) - 1]
     for link in links_to(below):
-        path = '{}/{}'.format(path, link.label)
+        path = '/'.join((path, link.label))
         if not leaving.failed_path.startswith(path + '/'):
             return None if link.inner_container is nodes[0].machine else link.inner_container
     return None

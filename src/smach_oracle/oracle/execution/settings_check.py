@@ -176,7 +176,7 @@ def _preconditions_of(node: TreeNode, label: str) -> Tuple[PreconditionSpec, ...
     if node.site.is_container:
         return node.settings_of(label).preconditions
     # labels given for all states of this label are meant for others: none is beside a branch
-    path = '{}/{}'.format(node.relative_path, label)
+    path = '/'.join((node.relative_path, label))
     given = node.settings.states.get(path, {}).get('preconditions', ())
     return cast('Tuple[PreconditionSpec, ...]', given)
 

@@ -425,7 +425,7 @@ class Step:
 
     def _enter_oracle(self, occasion: Occasion) -> OracleState:
         node, record, meta_label = self._node, self._record, self._node.settings.oracle_label
-        occasions.log_occasion(occasion, '{}/{}'.format(node.path, occasion.failure.state))
+        occasions.log_occasion(occasion, '/'.join((node.path, occasion.failure.state)))
         sync_oracle(node)
         if occasion.first_step is not FirstStep.ENTER_AGAIN:
             record.left_by(occasion.what, meta_label)

@@ -135,7 +135,7 @@ def _state_before(node: TreeNode) -> str:
         context = above.records.history.failure_context(label, '', above.record(label).totals[0])
         name = above.in_force.policy.step_back_target(context)
         if name:
-            return name if '/' in name else '{}/{}'.format(above.relative_path, name)
+            return name if '/' in name else '/'.join((above.relative_path, name))
     return ''
 
 
@@ -151,7 +151,7 @@ class TreePlace(NamedTuple):
     @property
     def path(self) -> str:
         """Return the path of the container, and the label."""
-        return '{}/{}'.format(self.node.path, self.label)
+        return '/'.join((self.node.path, self.label))
 
     @property
     def relative_path(self) -> str:
@@ -238,19 +238,19 @@ def allowed_for(node: TreeNode, label: str) -> str:
 
 def _unknown(node: TreeNode, label: str, name: str) -> str:
     names = {
-        '{}/{}'.format(each.relative_path, state)
+        '/'.join((each.relative_path, state))
         for each in nodes_of(node.top().machine)
         for state in each.labels()
     }
     if node.site.is_container:
         names.update(node.labels())
-    own = {label, '{}/{}'.format(node.relative_path, label)}
+    own = {label, '/'.join((node.relative_path, label))}
     return 'there is no such state' + did_you_mean(name, names - own)
 
 
 def _where_it_is(node: TreeNode, name: str) -> str:
     paths = [
-        '{}/{}'.format(each.relative_path, name)
+        '/'.join((each.relative_path, name))
         for each in nodes_of(node.top().machine)
         if each is not node and name in each.labels()
     ]

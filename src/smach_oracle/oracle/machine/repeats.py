@@ -194,7 +194,7 @@ def _done_below(node: TreeNode) -> Iterator[_Done]:
         for label, record in dict(each.records.by_label).items():
             mark = each.records.marks[label]
             if mark.done and record.settings.on_retry != ALLOW:
-                yield _Done('{}/{}'.format(path, label) if path else label, mark)
+                yield _Done('/'.join((path, label)) if path else label, mark)
 
 
 def _is_at_or_below(name: str, label: str) -> bool:

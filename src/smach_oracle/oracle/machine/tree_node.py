@@ -114,7 +114,7 @@ class TreeNode:
     def key(self) -> str:
         """Its path, and of a branch the label, too: all branches of a Concurrence have one path."""
         label = self.site.label
-        return '{}/{}'.format(self.path, label) if label else self.path
+        return '/'.join((self.path, label)) if label else self.path
 
     @property
     def relative_path(self) -> str:

@@ -183,7 +183,7 @@ class Inquiry:
 
 def _say_that_it_waits(recovery: Recovery, question: Question) -> None:
     """Log that somebody is asked: for minutes a machine that waits would look as if it hung."""
-    place = '{}/{}'.format(recovery.node.path, recovery.record.label)
+    place = '/'.join((recovery.node.path, recovery.record.label))
     if recovery.failure.still_runs:
         text = '{}: {} The expert is asked (question {})'
         smach.logwarn(text.format(place, recovery.failure.text, question.question_id))

@@ -330,4 +330,4 @@ def _entered_in(place: TreePlace, name: str) -> Iterator[Tuple[str, bool]]:
         yield name, any(visit.result is VisitResult.SUCCESS for visit in visits)
         return
     for each in inner:
-        yield from _entered_in(each, '{}/{}'.format(name, each.label))
+        yield from _entered_in(each, '/'.join((name, each.label)))

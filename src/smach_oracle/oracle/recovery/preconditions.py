@@ -96,7 +96,7 @@ def _raised(recovery: Recovery, name: str, err: Exception) -> str:
     """Return what a precondition raised. The log says so: it may be a mistake in a program."""
     text = 'raised {}'.format(repr_of(err))
     if recovery.scope.told is None:
-        place = '{}/{}'.format(recovery.node.path, recovery.record.label)
+        place = '/'.join((recovery.node.path, recovery.record.label))
         smach.logwarn('{}: precondition {} {}: it is not met'.format(place, name, text))
     return text
 

@@ -252,7 +252,7 @@ class Recovery:
         """Wait until the robot is well. Return False where something has ended the recovery."""
         node = self.node
         with standing_still(node.execution.runs_around), self.budget.work_time.paused():
-            place = '{}/{}'.format(node.path, self.record.label)
+            place = '/'.join((node.path, self.record.label))
             is_well = node.tree.health.wait_until_well(self.tell, place, what, why, self._in_time())
         return is_well and not self.is_over()
 

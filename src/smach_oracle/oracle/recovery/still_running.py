@@ -225,4 +225,4 @@ class WatchedVisit:
         self._node.warn(text, self._record.label)
 
     def _place(self) -> str:
-        return '{}/{}'.format(self._node.path, self._record.label)
+        return '/'.join((self._node.path, self._record.label))

@@ -343,7 +343,7 @@ class Settings:
         `path`: of its container, relative to the top machine, '' for that itself. Where several
         names of `states` stand for it, the most exact one wins.
         """
-        full = '{}/{}'.format(path, label) if path else label
+        full = '/'.join((path, label)) if path else label
         merged: Dict[str, object] = {}
         for name in sorted((name for name in self.states if matches(name, full)), key=exactness):
             merged.update(self.states[name])
@@ -369,7 +369,7 @@ class Settings:
 
     def offers_for(self, path: str, label: str) -> Tuple[InterfaceOffer, ...]:
         """Return the shared-autonomy interfaces on offer for a state."""
-        full = '{}/{}'.format(path, label) if path else label
+        full = '/'.join((path, label)) if path else label
         return tuple(
             offer
             for offer, states in self.interfaces

@@ -34,7 +34,7 @@ class Program:
         def execute(_):
             self.diary.write('begins', label)
             if label == self._dies_in:
-                time.sleep(0.2)  # so that what runs beside it has ended
+                time.sleep(0.2)  # so that all other states have ended
                 os.kill(os.getpid(), signal.SIGKILL)
             return self._outcomes[0]
 
@@ -79,6 +79,32 @@ def test_a_trial_goes_on_where_it_stood(tmp_path, names, dies_in):
     assert ends(tmp_path) == [str(names[0])]
 
 
+class Label(str, enum.Enum):
+    """Labels that are text, and say so in words of their own."""
+
+    IN = 'inside'
+    FIRST = 'first'
+    SECOND = 'second'
+    LAST = 'last'
+
+
+def labelled(folder, dies_in=''):
+    program = Program(folder, 'ok', 'aborted', dies_in)
+    inner = program.chain(
+        **{label: program.state(label.value) for label in (Label.FIRST, Label.SECOND)}
+    )
+    return program.run(program.chain(**{Label.IN: inner, Label.LAST: program.state('last')}))
+
+
+@pytest.mark.parametrize('dies_in', ['first', 'second', 'last'])
+def test_labels_may_be_members_of_an_enum_of_text(tmp_path, dies_in):
+    assert labelled(tmp_path, dies_in)[0] is None
+    outcome, begun = labelled(tmp_path)
+    assert outcome == "'ok'"
+    names = ('first', 'second', 'last')
+    assert begun == {label: 2 if label == dies_in else 1 for label in names}
+
+
 def beside(folder, names, dies_in=''):
     """A Concurrence that ends well where its machines have ended so."""
     program = Program(folder, *names, dies_in)
@@ -95,6 +121,6 @@ def beside(folder, names, dies_in=''):
 
 
 @pytest.mark.parametrize('names', NAMES)
-def test_what_has_ended_beside_it_is_not_done_again(tmp_path, names):
+def test_what_had_ended_in_another_thread_is_not_done_again(tmp_path, names):
     assert beside(tmp_path, names, 'R')[0] is None
     assert beside(tmp_path, names) == ("'done'", {'L': 1, 'R': 2})

@@ -2,6 +2,7 @@
 holds.
 """
 
+import enum
 import io
 
 import genpy
@@ -57,6 +58,18 @@ def test_outcomes_that_are_no_text_are_sent_as_their_text():
     assert goal.give_up_outcomes == ['0', 'None']
     wanted = over_the_wire(to_interface_goal(InterfaceOffer('assist', '/assist'), question))
     assert wanted.outcomes == ['True']
+
+
+class Label(str, enum.Enum):
+    PICK = 'pick'
+
+
+def test_a_label_that_is_a_member_of_an_enum_is_sent_as_its_value():
+    question = make_question(
+        failed_state=Label.PICK, history=(Visit(Label.PICK, 'ok', VisitResult.SUCCESS),)
+    )
+    goal = over_the_wire(to_goal(question, 'robot', NOW))
+    assert (goal.failed_state, goal.history[0].state) == ('pick', 'pick')
 
 
 def test_other_languages_arrive_as_they_are():
