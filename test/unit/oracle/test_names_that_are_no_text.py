@@ -181,13 +181,13 @@ def test_a_concurrence_with_such_labels_has_no_oracle_within(told):
     assert [each.runs for each in branches] == [2, 2]
 
 
-class Label(str, enum.Enum):
+class StateName(str, enum.Enum):
     LOOK = 'look'
     PICK = 'pick'
 
 
 def test_a_label_that_is_a_member_of_an_enum_is_called_by_its_value(told):
-    machine, states = chain(tuple(Label))
+    machine, states = chain(tuple(StateName))
     states[1].script = ['aborted'] * 2
     assert OracleContainer.wrap(machine, name='TASK').execute() == 'ok'
     assert told == ['TASK/pick failed: aborted'] * 2

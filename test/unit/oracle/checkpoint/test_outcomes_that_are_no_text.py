@@ -13,12 +13,12 @@ from smach_oracle.oracle import OracleContainer
 from smach_oracle.store.store_file import StoreFile
 
 
-class Seen(enum.Enum):
+class EndWord(enum.Enum):
     GOOD = 1
     BAD = 2
 
 
-NAMES = [('ok', 'aborted'), (0, 1), (True, False), (Seen.GOOD, Seen.BAD)]
+NAMES = [('ok', 'aborted'), (0, 1), (True, False), (EndWord.GOOD, EndWord.BAD)]
 
 
 class Program:

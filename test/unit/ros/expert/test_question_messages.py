@@ -60,13 +60,13 @@ def test_outcomes_that_are_no_text_are_sent_as_their_text():
     assert wanted.outcomes == ['True']
 
 
-class Label(str, enum.Enum):
+class WordLabel(str, enum.Enum):
     PICK = 'pick'
 
 
 def test_a_label_that_is_a_member_of_an_enum_is_sent_as_its_value():
     question = make_question(
-        failed_state=Label.PICK, history=(Visit(Label.PICK, 'ok', VisitResult.SUCCESS),)
+        failed_state=WordLabel.PICK, history=(Visit(WordLabel.PICK, 'ok', VisitResult.SUCCESS),)
     )
     goal = over_the_wire(to_goal(question, 'robot', NOW))
     assert (goal.failed_state, goal.history[0].state) == ('pick', 'pick')
