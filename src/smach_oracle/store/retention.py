@@ -40,7 +40,7 @@ class Retention:
         trials = sorted(self._store.trials(), key=lambda trial: trial.ended or trial.begun)
         asked = self._asked(trials)
         with transaction(self._store, keep=False) as database:
-            shared = _Shared(database) if self._size else None
+            shared = _SharedParts(database) if self._size else None
             for trial in trials:
                 why = self._why(database, trial, now)
                 if not why:
@@ -95,7 +95,7 @@ class Retention:
                     each.trial.number for each in self.going if each.trial.machine == machine
                 ]
             with transaction(self._store) as database:
-                _Shared(database).take_out(numbers)
+                _SharedParts(database).take_out(numbers)
         finally:
             for lock in locks:
                 lock.release()
@@ -111,7 +111,7 @@ def size_of(database: sqlite3.Connection) -> int:
     return int((pages - free) * size)
 
 
-class _Shared:
+class _SharedParts:
     """What trials share: structures by their ids, parts of values by their digests.
 
     All facts are looked through once, since thousands of trials may go.
