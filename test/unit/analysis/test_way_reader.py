@@ -114,6 +114,43 @@ def test_a_success_of_another_state_decides_nothing():
     assert [each[3] for each in found['TOP/PICK']] == [False, False, True]
 
 
+def test_a_choice_about_a_state_that_was_held_back_is_no_way_from_its_failure_before():
+    back, done = (
+        Answer(AnswerKind.GOTO, 'LOOK', by='ann'),
+        Answer(AnswerKind.SUPERSEDE, outcome='succeeded', by='ann'),
+    )
+    machine = machine_of(Scripted(), Scripted('aborted'))
+    settings = {'policy': 'escalating', 'states': {'PICK': {'on_retry': 'never'}}}
+    OracleContainer.wrap(machine, settings=settings, expert=Answers(back, back, done))
+    found = read(machine)
+    assert found == {'TOP/PICK': [('from LOOK', 'step_back', BY_PERSON, None)]}
+    (record,) = (
+        node.records.by_label['PICK'] for node in nodes_of(machine) if node.relative_path == ''
+    )
+    assert [each.way for each in record.ways_so_far()] == ['from LOOK']
+
+
+def test_a_persons_way_to_the_branch_beside_goes_by_the_name_that_the_executive_gives_it():
+    both = smach.Concurrence(ALL, 'aborted', outcome_map={'succeeded': {'RIGHT': 'succeeded'}})
+    with both:
+        smach.Concurrence.add('LEFT', Scripted('aborted'))
+        smach.Concurrence.add('RIGHT', Scripted())
+    machine = smach.StateMachine(outcomes=ALL)
+    with machine:
+        smach.StateMachine.add('BOTH', both)
+    settings = {'policy': 'escalating', 'states': {'LEFT': {'on_retry': 'never'}}}
+    expert = Answers(Answer(AnswerKind.GOTO, 'RIGHT', container='TOP/BOTH', by='ann'))
+    OracleContainer.wrap(machine, name='TOP', settings=settings, expert=expert)
+    found = read(machine)
+    own = [
+        (each.way, each.kind, each.place, each.helped)
+        for node in nodes_of(machine)
+        for record in node.records.by_label.values()
+        for each in record.ways_so_far()
+    ]
+    assert own and found == {'TOP/BOTH/LEFT': own}
+
+
 def test_a_step_back_out_of_a_container_belongs_to_the_state_that_failed():
     found = read(machine_of(Scripted(), Scripted(), Scripted(*['aborted'] * 3)))
     assert list(found) == ['TOP/INNER/REACH']

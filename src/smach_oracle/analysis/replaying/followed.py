@@ -175,6 +175,6 @@ def entered_way(jump: Event, failed: Key, entered: str) -> str:
     below the target.
     """
     container, label = split_path(entered) if entered else (jump.path, jump.target)
-    if container != failed[0]:
+    if container != failed[0] or (entered and label != failed[1]):  # or a branch beside
         return key_of_way('/' + '/'.join((container, label)).partition('/')[2], '')
     return key_of_way(label, failed[1])

@@ -13,6 +13,7 @@ from smach_oracle.oracle.decision.ways import (
     kind_of_choice,
 )
 from smach_oracle.oracle.records.events import Event, EventKind
+from smach_oracle.oracle.records.facts import Decider, decided_by
 from smach_oracle.oracle.records.way_results import WayLog, counts_of_kinds
 
 from ..trial_counter import TrialCounter, TrialEnding
@@ -56,6 +57,8 @@ class WayReader:
             self._failed.pop(key, None)
         elif event.kind == EventKind.DECISION:
             self._decided_min[key] = self._time.minutes
+            if decided_by(event) is Decider.HELD_BACK:  # the state has not run, so no failure
+                self._failed.pop(key, None)
         elif event.kind == EventKind.RESUMED:  # the program has forgotten which ways were gone
             self._forget()
         elif event.kind == EventKind.TRIAL_END:
