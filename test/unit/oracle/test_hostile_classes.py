@@ -252,3 +252,18 @@ def test_an_attribute_of_our_name_on_a_machine_without_an_oracle_is_its_own():
         smach.StateMachine.add('INNER', inner)
     watched = Watched(machine, settings={'nested': False})
     assert watched.run() == 'done' and inner._oracle == 'mine'
+
+
+def test_a_step_of_a_users_own_does_not_run_and_one_warning_for_its_class_says_so(log):
+    class Guarded(smach.StateMachine):
+        def _update_once(self):
+            raise AssertionError('an oracle makes each step')
+
+    for _ in range(2):
+        machine = OracleContainer.wrap(chain_of(Scripted('aborted'), machine_class=Guarded))
+        assert machine.execute() == 'done'
+    OracleContainer.wrap(smach.Sequence(['done'], 'done'))
+    warned = [text for level, text in log if level == 'warn' and '_update_once' in text]
+    assert warned == [
+        'Guarded._update_once does not run: under an oracle, the oracle makes each step'
+    ]

@@ -10,6 +10,7 @@ from ..identity import set_class
 _MADE: Dict[Tuple[int, int], type] = {}  # by ids of both classes, which it keeps
 # static in StateMachine, so that the order of bases alone does not find the user's
 _STATIC = ('add', 'add_auto')
+_STEP = '_update_once'
 
 
 def wrapped_class(oracle_class: type, base: type) -> type:
@@ -17,6 +18,9 @@ def wrapped_class(oracle_class: type, base: type) -> type:
     key = id(oracle_class), id(base)
     made = _MADE.get(key)
     if made is None:
+        if _static(base, _STEP) is not _static(smach.StateMachine, _STEP):
+            text = '{}.{} does not run: under an oracle, the oracle makes each step'
+            smach.logwarn(text.format(base.__name__, _STEP))
         namespace: Dict[str, object] = {
             '__module__': base.__module__,
             '__qualname__': base.__qualname__,
