@@ -76,6 +76,12 @@ class _AskingGoal:
         return now_s - self._seen_s
 
 
+HOW_TO_ANSWER = (
+    'No front end shows the question. `rosrun smach_oracle expert_terminal` answers it in a '
+    'terminal, and `rosrun smach_oracle expert_console` on a web page'
+)
+
+
 class ExpertQueryServer:
     """Hosts the questions of one robot or many.
 
@@ -98,7 +104,7 @@ class ExpertQueryServer:
         self._askers: Dict[str, List[_AskingGoal]] = {}
         self._listed_s = -math.inf
         self._wake = threading.Event()
-        self._stopped = False
+        self._stopped = self._has_said_how = False
         self._open_publisher = rospy.Publisher(
             self.name + '/open', OpenQueries, latch=True, queue_size=2
         )
@@ -162,9 +168,16 @@ class ExpertQueryServer:
                 goal.container_path,
                 'still runs' if still_runs else 'failed',
             )
+            self._say_how_to_answer()
         self._askers.setdefault(goal.query_id, []).append(_AskingGoal(handle))
         self._send_claim(goal.query_id, handle)
         self._changed()
+
+    def _say_how_to_answer(self) -> None:
+        """Say once how questions are answered, where no front end listens."""
+        if not (self._has_said_how or self._open_publisher.get_num_connections()):
+            self._has_said_how = True
+            rospy.logwarn(HOW_TO_ANSWER)
 
     def _send_claim(self, query_id: str, handle: actionlib.ServerGoalHandle) -> None:
         """A goal that joins a question learns at once who works on it."""

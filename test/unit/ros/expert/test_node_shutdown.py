@@ -1,4 +1,4 @@
-"""A node that goes down while a question is open logs no error and no warning about it."""
+"""What a node logs of a question: no error and no warning as it goes down while one is open."""
 
 import threading
 
@@ -20,6 +20,9 @@ class FakeTopic:
         self.closed = False
         self.impl = self
         self.connections = []
+
+    def get_num_connections(self):
+        return len(self.connections)
 
     def publish(self, message):
         if self.closed:
@@ -122,6 +125,20 @@ def test_a_list_of_questions_meets_a_closed_topic_in_a_shutdown_only(hooks, monk
     monkeypatch.setattr(rospy.core, 'is_shutdown_requested', lambda: True)
     hosted._publish_list()
     assert len(hosted._open_publisher.sent) == 1  # at the start
+
+
+@pytest.mark.parametrize('front_ends, said', [([], 1), (['/console'], 0)])
+def test_how_a_question_is_answered_is_said_once_where_no_front_end_shows_it(
+    hooks, monkeypatch, front_ends, said
+):
+    told = []
+    monkeypatch.setattr(rospy, 'logwarn', told.append)
+    hosted = ExpertQueryServer()
+    hosted._open_publisher.connections = front_ends
+    for number in '12':
+        goal = to_goal(make_question(number), '/robot', rospy.Time(1))
+        hosted._action.on_goal(FakeHandle(goal, hosted._action.status_pub))
+    assert told == [server.HOW_TO_ANSWER] * said
 
 
 class LostLink:
