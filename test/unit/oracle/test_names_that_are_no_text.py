@@ -157,7 +157,7 @@ def test_one_inside_of_others_is_tried_again_as_a_whole(told):
     with machine:
         smach.StateMachine.add('IN', inner)
     wrapped = OracleContainer.wrap(machine, name='TASK')
-    assert told == ['TASK/IN: it has no oracle of its own: ' + WHY]
+    assert told == ['TASK/IN: it has no oracle of its own, since ' + WHY]
     assert wrapped.execute() == 'ok'
     assert [each.runs for each in states] == [3, 2]
     assert [row.state for row in wrapped.rates()] == ['IN']
@@ -176,7 +176,7 @@ def test_a_concurrence_with_such_labels_has_no_oracle_within(told):
     with machine:
         smach.StateMachine.add('BESIDE', beside)
     wrapped = OracleContainer.wrap(machine, name='TASK')
-    assert told == ['TASK/BESIDE: its states get no oracle: ' + WHY]
+    assert told == ['TASK/BESIDE: its states get no oracle, since ' + WHY]
     assert wrapped.execute() == 'ok'
     assert [each.runs for each in branches] == [2, 2]
 
@@ -191,3 +191,16 @@ def test_a_label_that_is_a_member_of_an_enum_is_called_by_its_value(told):
     states[1].script = ['aborted'] * 2
     assert OracleContainer.wrap(machine, name='TASK').execute() == 'ok'
     assert told == ['TASK/pick failed: aborted'] * 2
+
+
+@pytest.mark.parametrize('odd', [5, 'odd', Seen.GOOD])
+@pytest.mark.parametrize('recover', [True, False])
+def test_a_branch_may_end_by_what_it_has_not_registered(odd, recover):
+    beside = smach.Concurrence(['ok', 'odd'], 'ok', outcome_map={'odd': {'LEFT': odd}})
+    with beside:
+        smach.Concurrence.add('LEFT', Scripted(*[odd] * 9, outcomes=['ok', 'aborted']))
+        smach.Concurrence.add('RIGHT', Scripted(outcomes=['ok', 'aborted']))
+    machine = smach.StateMachine(outcomes=['ok', 'odd'])
+    with machine:
+        smach.StateMachine.add('BESIDE', beside)
+    assert OracleContainer.wrap(machine, recover=recover).execute() == 'odd'

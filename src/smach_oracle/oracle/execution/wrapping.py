@@ -144,7 +144,7 @@ def _adopt_below(parent: TreeNode, found: Dict[int, TreeNode]) -> None:
             why_not = why_no_oracle(child)
             if why_not:
                 path = '/'.join((parent.path, *below))
-                smach.logwarn('{}: it has no oracle of its own: {}'.format(path, why_not))
+                smach.logwarn('{}: it has no oracle of its own, since {}'.format(path, why_not))
                 continue
             tree = parent.tree
             node = _put_under(child, tree.container_class, tree, parent.settings, '')

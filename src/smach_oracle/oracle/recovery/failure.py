@@ -142,8 +142,8 @@ def _judge(
         )
         told = outcome if isinstance(outcome, str) else ''
         failure = Failure(label, FailureKind.UNREGISTERED_OUTCOME, told, text)
-        if isinstance(outcome, str) and not node.site.is_container:
-            return failure._replace(route=Route(told, False))
+        if outcome is not None and not node.site.is_container:  # which takes it as it is
+            return failure._replace(route=Route(cast('str', outcome), False))
         return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
     outcome = cast('str', outcome)
     route = route_of(machine, label, outcome)
