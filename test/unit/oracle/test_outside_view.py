@@ -8,6 +8,7 @@ from forked import in_a_fork
 from guarded_machines import chain
 from held_machines import Gate, Held
 from machines import FakeExpert, Scripted, Watched, chain_of, give_up, goto, supersede, watched
+from reporting_machines import reporting
 
 import smach
 from smach_oracle.oracle import OracleContainer, oracle_of
@@ -218,6 +219,38 @@ def test_a_plain_success_is_told_to_who_registered_for_transitions():
     assert told == [['B'], ['C']] * 3
 
 
+ASKS = {'policy': 'always_ask', 'author_recoveries': 'override'}
+
+
+@pytest.mark.parametrize(
+    'answer, ended',
+    [
+        (give_up(), [['B'], ['IN']]),
+        (give_up('preempted'), [['B'], ['IN']]),
+        (supersede('ok'), [['B'], ['IN']]),
+        (goto('A', container='SM_ROOT'), [['B'], ['B'], ['IN']]),  # the container is left
+    ],
+)
+def test_a_termination_callback_is_told_the_state_that_ran_last(answer, ended):
+    inner, told = chain(B=Scripted('aborted', 'ok')), []
+    machine = chain(A=Scripted(), IN=inner)
+    for each in (inner, machine):
+        each.register_termination_cb(lambda userdata, states, outcome: told.append([*states]))
+    Watched(machine, expert=FakeExpert(answer), settings=ASKS).run()
+    assert told == ended
+
+
+@pytest.mark.parametrize('recover', [True, False])
+def test_a_termination_callback_is_told_the_state_that_reports_a_failure(recover):
+    told = []
+    settings = {'policy': 'always_ask'}
+    work = Scripted('failed', outcomes=('ok', 'failed'))
+    machine = reporting(work, recover=recover, settings=settings)
+    machine.machine.register_termination_cb(lambda userdata, *ended: told.append(ended))
+    assert machine.run() == 'failed'
+    assert told == [(['REPORT'], 'failed')]
+
+
 # -- in a child process of the program
 
 
@@ -300,9 +333,8 @@ def test_nothing_that_is_under_way_travels_with_a_copy(copied):
 )
 def test_the_meta_state_ends_with_what_the_machine_goes_by(fails, answer, returned):
     inner = chain(B=Scripted(fails, 'ok'))
-    settings = {'policy': 'always_ask', 'author_recoveries': 'override'}
     machine = Watched(
-        chain(A=Scripted(), IN=inner), expert=FakeExpert(answer, goto('A')), settings=settings
+        chain(A=Scripted(), IN=inner), expert=FakeExpert(answer, goto('A')), settings=ASKS
     )
     meta = inner.get_children()['ORACLE']
     execute, ends = meta.execute, []

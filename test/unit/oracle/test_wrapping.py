@@ -122,12 +122,12 @@ def test_oracle_is_the_active_state_while_it_works_and_callbacks_see_it():
     assert seen == [('start', ['A']), ['ORACLE'], ['A'], ['B'], ('end', ['B'], 'done')]
 
 
-def test_termination_callbacks_see_the_oracle_where_it_ends_the_machine():
+def test_termination_callbacks_see_the_state_that_failed_where_the_oracle_ends_the_machine():
     seen = []
     machine = watched(Scripted('aborted'), settings={'max_recoveries': 0}).machine
     machine.register_termination_cb(lambda ud, labels, outcome: seen.append((labels, outcome)))
     assert machine.execute() == 'aborted'
-    assert seen == [(['ORACLE'], 'aborted')]
+    assert seen == [(['A'], 'aborted')]
 
 
 def test_a_state_added_after_wrapping_is_under_the_oracle():

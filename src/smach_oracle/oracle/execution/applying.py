@@ -28,15 +28,17 @@ from .transitions import be_back, go_to, message_of, obey_preempt, stop_left_beh
 class Applying:
     """One verdict on its way out of the meta state.
 
-    Its methods return the container's outcome, or None where the machine goes on.
+    Its methods return the container's outcome, or None where the machine goes on. `last_label`: of
+    the state that ran last. It may report the failure of an earlier one.
     """
 
-    def __init__(self, recovery: Recovery, meta: OracleState) -> None:
+    def __init__(self, recovery: Recovery, meta: OracleState, last_label: str) -> None:
         self._node = recovery.node
         self._machine = recovery.node.machine
         self._record = recovery.record
         self._occasion = recovery.occasion
         self._meta = meta
+        self._last_label = last_label
 
     def apply(self, verdict: Verdict) -> Optional[str]:
         """Go as a verdict says.
@@ -156,5 +158,6 @@ class Applying:
 
     def _terminate(self, outcome: str) -> str:
         """Leave the meta state for a container outcome."""
-        self._node.records.oracle_edges[outcome] += 1
-        return terminate(self._node, self._node.settings.oracle_label, outcome, outcome)
+        node = self._node
+        node.records.oracle_edges[outcome] += 1
+        return terminate(node, node.settings.oracle_label, outcome, outcome, self._last_label)

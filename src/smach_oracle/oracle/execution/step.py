@@ -418,7 +418,7 @@ class Step:
             finally:
                 lock.acquire()
                 recovery.settle(verdict)
-            return Applying(recovery, meta).apply(verdict)
+            return Applying(recovery, meta, self._record.label).apply(verdict)
         except BaseException:
             be_back(node, self._record.label)
             raise

@@ -71,8 +71,13 @@ def stop_left_behind(node: TreeNode) -> Stop:
     return Stop()
 
 
-def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
-    """End the container. A preempt that its last state has serviced is serviced."""
+def terminate(
+    node: TreeNode, label: str, outcome: str, container_outcome: str, told: Optional[str] = None
+) -> str:
+    """End the container. A preempt that its last state has serviced is serviced.
+
+    `told`: the state of the author's of which callbacks are told, `label` where it is None.
+    """
     machine = node.machine
     if has_preempt_flag(machine):
         last = current_state_of(machine)
@@ -82,17 +87,19 @@ def terminate(node: TreeNode, label: str, outcome: str, container_outcome: str) 
             and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
         ):
             machine.service_preempt()
-    return _end(node, label, outcome, container_outcome)
+    return _end(node, label, outcome, container_outcome, told)
 
 
-def _end(node: TreeNode, label: str, outcome: str, container_outcome: str) -> str:
+def _end(
+    node: TreeNode, label: str, outcome: str, container_outcome: str, told: Optional[str] = None
+) -> str:
     machine = node.machine
     set_current_label(machine, None)
     if node.site.is_container:
         smach.loginfo(
             "State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome)
         )
-    machine.call_termination_cbs([label], container_outcome)
+    machine.call_termination_cbs([label if told is None else told], container_outcome)
     return container_outcome
 
 
