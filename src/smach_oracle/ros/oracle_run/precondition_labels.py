@@ -72,9 +72,9 @@ def _misplaced(use: _Use, paths: Set[str]) -> SettingsError:
 
 
 def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator[_Use]:
-    children = children_of(container)
+    children = _named_children(container)
     for label, state in children.items():
-        below = '{}/{}'.format(path, label) if path else label
+        below = '/'.join((path, label)) if path else label
         if isinstance(container, smach.StateMachine):
             others = tuple(sorted(other for other in children if other != label))
             for spec in settings.for_state(path, label).preconditions:
@@ -87,8 +87,14 @@ def _uses(container: smach.Container, settings: Settings, path: str) -> Iterator
 
 def _paths(container: smach.Container, above: str) -> Iterator[str]:
     """Yield the paths of all states in a container."""
-    for label, state in children_of(container).items():
-        path = '{}/{}'.format(above, label) if above else label
+    for label, state in _named_children(container).items():
+        path = '/'.join((above, label)) if above else label
         yield path
         if isinstance(state, smach.Container):
             yield from _paths(state, path)
+
+
+def _named_children(container: smach.Container) -> Dict[str, smach.State]:
+    """Return the states in a container that a setting can name."""
+    children = children_of(container)
+    return {label: state for label, state in children.items() if isinstance(label, str)}

@@ -112,8 +112,9 @@ def names_in(container: smach.Container) -> Set[str]:
             continue
         seen.append(each)
         for label, state in children_of(each).items():
-            path = '{}/{}'.format(above, label) if above else str(label)
-            found.update((str(label), path), map(str, state.get_registered_outcomes()))
+            name = label if isinstance(label, str) else str(label)
+            path = '/'.join((above, name)) if above else name
+            found.update((name, path), map(str, state.get_registered_outcomes()))
             if isinstance(state, smach.Container):
                 waiting.append((path, state))
     return found
