@@ -37,6 +37,7 @@ from ..command_line import parameters_only
 from ..connections import quiet_at_shutdown
 from ..master_watch import start_master_watch
 from ..parameters import name_of, number_of
+from ..senders.own_messages import others_listen
 from .open_questions import (
     LEASE_S,
     LONGEST_LEASE_S,
@@ -77,8 +78,8 @@ class _AskingGoal:
 
 
 HOW_TO_ANSWER = (
-    'No front end shows the question. `rosrun smach_oracle expert_terminal` answers it in a '
-    'terminal, and `rosrun smach_oracle expert_console` on a web page'
+    'No front end shows the question. Answer it in a terminal with `rosrun smach_oracle '
+    'expert_terminal`, or on a web page with `rosrun smach_oracle expert_console`'
 )
 
 
@@ -175,7 +176,7 @@ class ExpertQueryServer:
 
     def _say_how_to_answer(self) -> None:
         """Say once how questions are answered, where no front end listens."""
-        if not (self._has_said_how or self._open_publisher.get_num_connections()):
+        if not (self._has_said_how or others_listen(self._open_publisher)):
             self._has_said_how = True
             rospy.logwarn(HOW_TO_ANSWER)
 

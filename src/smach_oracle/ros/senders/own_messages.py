@@ -81,7 +81,15 @@ def subscribe_to_owner(
 
 def listens(publisher: rospy.Publisher, node: str) -> bool:
     """Whether a node listens to what this one publishes there."""
+    return node in _listeners(publisher)
+
+
+def others_listen(publisher: rospy.Publisher) -> bool:
+    """Whether a node other than this one listens to what this one publishes there."""
+    return bool(_listeners(publisher) - {rospy.get_name()})
+
+
+def _listeners(publisher: rospy.Publisher) -> Set[str]:
     implementation = publisher.impl
-    return implementation is not None and any(
-        getattr(each, 'endpoint_id', '') == node for each in implementation.connections
-    )
+    connections = [] if implementation is None else list(implementation.connections)
+    return {getattr(each, 'endpoint_id', '') for each in connections}
