@@ -92,26 +92,19 @@ def _why_kept(group: Sequence[KnownBag]) -> str:
 
 
 def _groups(bags: Sequence[KnownBag]) -> List[List[KnownBag]]:
-    """Bags that have trials in common belong together.
-
-    It takes no longer for each bag where there are thousands.
-    """
+    """Return the bags in groups: those that have trials in common belong together."""
     groups: List[List[KnownBag]] = []
     of_trials: Dict[str, List[KnownBag]] = {}
     for bag in bags:
         found = {id(each): each for each in map(of_trials.get, bag.trials) if each is not None}
-        smaller = sorted(found.values(), key=len)
-        if smaller:
-            mine = smaller.pop()
-        else:
-            mine = []
+        *smaller, mine = sorted(found.values(), key=len) or [[]]
+        if not found:
             groups.append(mine)
-        mine.append(bag)
+        added = [bag, *(each for other in smaller for each in other)]
+        mine += added
         for other in smaller:
-            mine += other
             other.clear()
-        joined = mine if smaller else [bag]
-        of_trials.update((trial, mine) for each in joined for trial in each.trials)
+        of_trials.update((trial, mine) for each in added for trial in each.trials)
     return [group for group in groups if group]
 
 
