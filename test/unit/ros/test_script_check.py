@@ -143,16 +143,20 @@ def test_the_report_says_where_the_other_branches_may_have_a_failure_kept(check)
 def test_the_report_says_which_machine_runs_without_an_oracle(check):
     code, report, errors = check(
         """
-        sm = machine(0, 1)
+        sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
+        with sm:
+            smach.StateMachine.add(0, machine('LOOK', 'PICK'))
         print('OUTCOME', sm.execute())
-    """
+    """,
+        'states: {PICK: {time_limit_s: 20}}',
     )
     assert code == 0, errors
     why = (
-        "Warning: TASK: the label 0 of a state is no text; allowed: text, such as '0'. It runs "
+        "Warning: TASK: the label 0 of a state is not text; allowed: text, such as '0'. It runs "
         'without an oracle'
     )
     assert why in ' '.join(report.split())
+    assert 'begins at LOOK' in report and 'time limit    20 s' in report
     assert '1 warning: no error in the settings for 1 machine.' in report
     assert 'OUTCOME succeeded' in errors
 

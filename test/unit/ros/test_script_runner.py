@@ -350,7 +350,9 @@ def test_an_error_names_the_settings_as_they_were_given(run, tmp_path):
     assert done.returncode == 2 and 'oracle_run: oracle.yaml line 1: states.POUR' in done.stderr
 
 
-def test_a_machine_with_labels_that_are_no_text_runs_without_an_oracle(run):
+@pytest.mark.parametrize('states', ['', 'states: {ONLY: {time_limit_s: 20}}'])
+def test_a_machine_with_labels_that_are_no_text_runs_without_an_oracle(run, tmp_path, states):
+    (tmp_path / 'oracle.yaml').write_text(states)
     text = """
         smach.set_loggers(*[print] * 4)
         top = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
@@ -360,7 +362,9 @@ def test_a_machine_with_labels_that_are_no_text_runs_without_an_oracle(run):
             smach.StateMachine.add(1, inner)
         print(top.execute(), inner['ONLY'].visits, type(top) is smach.StateMachine)
     """
-    done = run(text)
+    done = run(text, options=('--config', 'oracle.yaml'))
     assert done.stdout.splitlines()[-1] == 'succeeded 2 True', done.stdout + done.stderr
-    why = "the label 0 of a state is no text; allowed: text, such as '0'. It runs without an oracle"
+    why = (
+        "the label 0 of a state is not text; allowed: text, such as '0'. It runs without an oracle"
+    )
     assert done.stdout.count(why) == 1

@@ -94,9 +94,10 @@ class MachineCheck:
             is_left = isinstance(machine, OracleContainer)
             if not is_left:
                 self._wrap(machine)
-            if not isinstance(machine, OracleContainer):
-                self.machines += 1
+            if not isinstance(machine, OracleContainer):  # those in it are top machines
                 self._warn(warnings)
+                for each in list(_outermost_inside(machine)):
+                    self._check(each, running)
                 return
             name = _prepare(machine, running, self._names.complain)
             if is_left:
@@ -182,7 +183,11 @@ def _top_machines(container: smach.Container) -> Iterator[smach.StateMachine]:
     """The outermost machines in a container, itself among them."""
     if isinstance(container, smach.StateMachine):
         yield container
-        return
+    else:
+        yield from _outermost_inside(container)
+
+
+def _outermost_inside(container: smach.Container) -> Iterator[smach.StateMachine]:
     nested: List[smach.StateMachine] = []
     for machine in machines_inside(container):  # each after those around it
         if not any(machine is each for each in nested):
