@@ -386,15 +386,16 @@ def _keys_below(below: TreeNode, keys: Set[str]) -> Set[str]:
 # -- userdata between containers
 
 
-def hand_down(link: ContainerLink) -> None:
-    """Give a container its input keys, as when it begins."""
+def hand_down(link: ContainerLink) -> Set[str]:
+    """Give a container its input keys, as when it begins, and return those that were there."""
     outer = link.outer_container
     given = dict(data_of(outer.userdata))
     if isinstance(outer, smach.StateMachine):
         given.update(constants_of(outer, link.label))
-    for key, named in _inputs(link):
-        if named in given:
-            link.inner_container.userdata[key] = given[named]
+    handed = {key: named for key, named in _inputs(link) if named in given}
+    for key, named in handed.items():
+        link.inner_container.userdata[key] = given[named]
+    return set(handed)
 
 
 def hand_up(

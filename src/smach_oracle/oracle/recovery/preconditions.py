@@ -8,7 +8,7 @@ through their output keys, and down through the input keys of the containers aro
 state.
 """
 
-from typing import List, Union, cast
+from typing import Dict, List, Set, Tuple, Union, cast
 
 import smach
 from smach_common.foreign import repr_of
@@ -30,7 +30,7 @@ from ..machine.site import judged_at
 from ..machine.userdata import UserdataGate, WriteWatch, behind, view_behind, write_constants
 from ..machine.workers import Overrun
 from ..records.events import FailureKind
-from ..settings.failing_outcomes import is_preempted
+from ..settings.failing_outcomes import is_preempted, name_text
 from ..settings.preconditions import PreconditionKind, PreconditionSpec
 from ..settings.settings import ALLOW, RUN
 from ..smach_private import constants_of, data_of, is_executing, states_of
@@ -205,7 +205,7 @@ def _judge(recovery: Recovery, place: TreePlace, state: smach.State, outcome: ob
         )
     else:
         listed = node.settings.defaults.failure_outcomes
-        failed = outcome in node.in_force.failing or outcome in listed
+        failed = outcome in node.in_force.failing or name_text(outcome) in listed
     if failed or is_preempted(outcome):
         raise NotMet('ended with {!r}'.format(outcome))
 
@@ -230,12 +230,12 @@ class _Elsewhere:
         self._runs = not way.entered_places[1:]
         self._watch = WriteWatch(place.node.machine, place.node.in_force.deep_copy_keys)
         self._begun = self._watch.begin()
-        below = [data_of(link.inner_container.userdata) for link in self._down]
-        self._before = [(data, dict(data)) for data in below[:-1]]
-        self._before += [(data, self._begun.data) for data in below[-1:]]
         self.gate = self._watch.gate
+        # what was there in each container, and the keys that it got
+        self._handed_down: List[Tuple[Dict[str, object], Dict[str, object], Set[str]]] = []
         for link in self._down:
-            hand_down(link)
+            data = data_of(link.inner_container.userdata)
+            self._handed_down.append((data, dict(data), hand_down(link)))
 
     def take_back(self) -> None:
         """Make the userdata what it was."""
@@ -243,9 +243,12 @@ class _Elsewhere:
             self._watch.take_back_own(self._begun)
             return
         self._watch.take_back(self._begun)
-        for data, before in self._before:  # without what was handed down
-            data.clear()
-            data.update(before)
+        for data, before, handed in self._handed_down:
+            for key in handed:
+                if key in before:
+                    data[key] = before[key]
+                else:
+                    data.pop(key, None)
 
     def hand_over(self) -> None:
         """Hand what the state wrote to the container of the failed state, as its author says."""
