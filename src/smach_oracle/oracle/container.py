@@ -127,7 +127,7 @@ class OracleContainer(smach.StateMachine):
         'succeeded'
 
         :raises SettingsError: naming key, value and what is allowed.
-        :raises LabelError: where a state has a label that is no text.
+        :raises LabelError: where a state has a label that is not text.
         """
         check_arguments(name, expert, recover, strict, health)
         checked = as_settings(settings, preconditions)
@@ -447,7 +447,7 @@ class OracleContainer(smach.StateMachine):
 
     def _state_ended(self, outcome: object, error: Optional[Exception]) -> Optional[str]:
         """Go on behind the current state, which was executed elsewhere, with the lock held."""
-        return Step(self._oracle, self._oracle.record(str(self._current_label))).ended(
+        return Step(self._oracle, self._oracle.record(cast('str', self._current_label))).ended(
             outcome, error
         )
 

@@ -8,7 +8,7 @@ Their tree::
     |     +-- InterfaceError: the interface that an expert chose cannot be used
     +-- OperatorError (also a ValueError): an operator's command cannot be obeyed
     +-- CheckpointError: the store of a machine cannot be used
-    +-- LabelError (also a TypeError): a state of a machine has a label that is no text
+    +-- LabelError (also a TypeError): a state of a machine has a label that is not text
     +-- TrialError: the executive was used out of order
     +-- TooDeepError (also a RecursionError): too many containers lie in each other
 """
@@ -72,7 +72,7 @@ class CheckpointError(OracleError):
 
 
 class LabelError(OracleError, TypeError):
-    """A state of a machine has a label that is no text, so that no setting or event can name it.
+    """A state of a machine has a label that is not text, so that no setting or event can name it.
 
     SMACH executes such a machine. An oracle does not.
     """

@@ -91,6 +91,15 @@ def is_same(one: object, other: object) -> bool:
     return False
 
 
+def is_hashable(value: object) -> bool:
+    """Whether an object may be a key."""
+    try:
+        hash(value)
+    except TypeError:
+        return False
+    return True
+
+
 def truth_of(value: object) -> Optional[bool]:
     """Return whether a value counts as true, None where its class does not say, as an array's."""
     try:

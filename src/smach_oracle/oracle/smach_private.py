@@ -209,12 +209,12 @@ def set_states(concurrence: Any, states: Mapping[str, smach.State]) -> None:
 def items_label_of(container: object) -> Optional[str]:
     """Return the key of an Iterator's userdata that has the item, None for other containers."""
     label = own_mark(container, '_items_label')
-    return None if label is None else str(label)
+    return None if label is None else cast('str', label)
 
 
 def initial_label_of(container: object) -> str:
     """Return the label of the state in which a container begins."""
-    return str(own_mark(container, '_initial_state_label') or '')
+    return cast('str', own_mark(container, '_initial_state_label') or '')
 
 
 def transitions_in(container: object, label: str) -> Transitions:

@@ -18,7 +18,12 @@ class Seen(enum.Enum):
     BAD = 2
 
 
-NAMES = [(Seen.GOOD, Seen.BAD), (0, 1), (1, 0), (True, False), (False, True)]
+class Code(int, enum.Enum):
+    GOOD = 0
+    BAD = 1
+
+
+NAMES = [(Seen.GOOD, Seen.BAD), (Code.GOOD, Code.BAD), (0, 1), (1, 0), (True, False), (False, True)]
 
 
 def tree(good, bad, *script, ends=None):
@@ -118,6 +123,21 @@ def test_an_end_counts_as_the_text_that_is_recorded():
     assert FailureRule(('2',)).meaning(2) is EndMeaning.FAILURE
 
 
+@pytest.mark.parametrize('good, bad', NAMES)
+@pytest.mark.parametrize('given', ['failing_outcomes', 'failure_outcomes'])
+def test_the_settings_name_an_outcome_by_its_text(good, bad, given):
+    machine, runs = tree(good, bad, bad)
+    assert OracleContainer.wrap(machine, settings={given: [str(bad)]}).execute() is good
+    assert len(runs) == 3
+
+
+def test_one_is_meant_so_by_its_text():
+    machine, runs = tree('ok', 2, 2, ends=('ok', 'failed'))
+    settings = {'states': {'A': {'intended_outcomes': ['2']}}}
+    assert OracleContainer.wrap(machine, settings=settings).execute() == 'failed'
+    assert len(runs) == 1
+
+
 # -- labels
 
 
@@ -133,7 +153,9 @@ def chain(labels, *script):
 @pytest.mark.parametrize('labels', [(0, 1), (Seen.GOOD, Seen.BAD), ('A', 1)])
 def test_a_machine_with_a_label_that_is_no_text_is_refused_and_stays_bare(labels):
     machine, _ = chain(labels)
-    with pytest.raises(LabelError, match='TASK: the label .* of a state is no text; allowed: text'):
+    with pytest.raises(
+        LabelError, match='TASK: the label .* of a state is not text; allowed: text'
+    ):
         OracleContainer.wrap(machine, name='TASK')
     assert type(machine) is smach.StateMachine
     assert machine.execute() == 'ok'
@@ -147,7 +169,16 @@ def told(monkeypatch):
     return heard
 
 
-WHY = "the label 0 of a state is no text; allowed: text, such as '0'"
+WHY = "the label 0 of a state is not text; allowed: text, such as '0'"
+
+
+def test_a_machine_that_gets_such_a_label_later_does_not_begin():
+    machine, _ = chain(('A', 'B'))
+    wrapped = OracleContainer.wrap(machine, name='TASK')
+    with machine:
+        smach.StateMachine.add(3, Scripted(outcomes=('ok', 'aborted')))
+    with pytest.raises(LabelError, match='TASK: the label 3 of a state is not text'):
+        wrapped.execute()
 
 
 def test_one_inside_of_others_is_tried_again_as_a_whole(told):
@@ -158,8 +189,9 @@ def test_one_inside_of_others_is_tried_again_as_a_whole(told):
         smach.StateMachine.add('IN', inner)
     wrapped = OracleContainer.wrap(machine, name='TASK')
     assert told == ['TASK/IN: it has no oracle of its own, since ' + WHY]
-    assert wrapped.execute() == 'ok'
-    assert [each.runs for each in states] == [3, 2]
+    assert [wrapped.execute(), wrapped.execute()] == ['ok', 'ok']
+    assert [each for each in told if 'since' in each] == told[:1]
+    assert [each.runs for each in states] == [4, 3]
     assert [row.state for row in wrapped.rates()] == ['IN']
 
 
@@ -177,8 +209,9 @@ def test_a_concurrence_with_such_labels_has_no_oracle_within(told):
         smach.StateMachine.add('BESIDE', beside)
     wrapped = OracleContainer.wrap(machine, name='TASK')
     assert told == ['TASK/BESIDE: its states get no oracle, since ' + WHY]
-    assert wrapped.execute() == 'ok'
-    assert [each.runs for each in branches] == [2, 2]
+    assert [wrapped.execute(), wrapped.execute()] == ['ok', 'ok']
+    assert [each for each in told if 'since' in each] == told[:1]
+    assert [each.runs for each in branches] == [3, 3]
 
 
 class StateName(str, enum.Enum):
@@ -193,7 +226,24 @@ def test_a_label_that_is_a_member_of_an_enum_is_called_by_its_value(told):
     assert told == ['TASK/pick failed: aborted'] * 2
 
 
-@pytest.mark.parametrize('odd', [5, 'odd', Seen.GOOD])
+def test_the_question_and_the_policy_call_it_so():
+    machine, states = chain(tuple(StateName))
+    states[1].script = ['aborted'] * 2
+    expert = FakeExpert(Answer(AnswerKind.GOTO, 'look'))
+    settings = {'policy': {'name': 'ladder', 'wait_s': 0}, 'max_recoveries': 1}
+    assert OracleContainer.wrap(machine, settings=settings, expert=expert).execute() == 'ok'
+    (question,) = expert.questions
+    assert question.reason.startswith('pick ') and question.failed_state == 'pick'
+
+
+def test_a_restart_begins_with_it():
+    machine, states = chain(tuple(StateName))
+    states[1].script = ['aborted']
+    assert OracleContainer.wrap(machine, settings={'policy': 'restart'}).execute() == 'ok'
+    assert [each.runs for each in states] == [2, 2]
+
+
+@pytest.mark.parametrize('odd', [5, 'odd', Seen.GOOD, Code.BAD])
 @pytest.mark.parametrize('recover', [True, False])
 def test_a_branch_may_end_by_what_it_has_not_registered(odd, recover):
     beside = smach.Concurrence(['ok', 'odd'], 'ok', outcome_map={'odd': {'LEFT': odd}})

@@ -3,6 +3,8 @@
 from typing import Callable, Dict, Iterable, List, Mapping, NamedTuple, Sequence, Tuple
 
 from ..errors import AnswerError
+from ..identity import is_hashable
+from ..settings.failing_outcomes import name_text
 from .question import Answer, AnswerKind, Question, names
 
 Target = Tuple[str, str]  # path of a container, '' for that of the failed state; label in it
@@ -48,7 +50,7 @@ def checked_type(given: object) -> Answer:
     if not isinstance(given.kind, AnswerKind):
         raise AnswerError('kind is {}, not an AnswerKind'.format(_type_of(given.kind)))
     for name in ('state', 'outcome', 'interface'):
-        if not _is_hashable(getattr(given, name)):
+        if not is_hashable(getattr(given, name)):
             raise AnswerError('{} is {}, not a name'.format(name, _type_of(getattr(given, name))))
     for name in ('by', 'why', 'container'):
         if not isinstance(getattr(given, name), str):
@@ -62,22 +64,14 @@ def _type_of(value: object) -> str:
     return 'of type ' + type(value).__name__
 
 
-def _is_hashable(value: object) -> bool:
-    try:
-        hash(value)
-    except TypeError:
-        return False
-    return True
-
-
 def addressed(answer: Answer, choices: AnswerChoices) -> Answer:
     """Return an answer with the container of what it names, and the outcome itself.
 
     A state that the container of the failed state has not, and one other has, is that one's.
-    An outcome that is no text is answered by its text.
+    An outcome that is not text is answered by its text.
     """
     for outcome in _outcomes_for(answer, choices):
-        if not isinstance(outcome, str) and str(outcome) == answer.outcome:
+        if name_text(outcome) == answer.outcome:
             answer = answer._replace(outcome=outcome)
     is_beside = (answer.container, answer.state) in choices.states  # another branch
     if answer.container == choices.container and not is_beside:

@@ -54,7 +54,7 @@ def _new_wrapper(
         why_not = 'its class cannot be extended ({})'.format(err)
     if why_not:
         path = '/'.join((parent.path, *labels))
-        smach.logwarn('{}: its states get no oracle, since {}'.format(path, why_not))
+        parent.tree.warn_for_good('{}: its states get no oracle, since {}'.format(path, why_not))
         return None
     kind = IteratorWrapper if isinstance(container, smach.Iterator) else ContainerWrapper
     wrapper = kind(container, parent, labels)

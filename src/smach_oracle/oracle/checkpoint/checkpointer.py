@@ -31,6 +31,7 @@ from ..records.events import Event, EventKind, FailureKind
 from ..records.facts import JUMPED_FROM, JUMPED_TO, TAKEN_UP
 from ..records.running_goals import GOALS
 from ..scope.scope import Reason
+from ..settings.failing_outcomes import name_text
 from ..smach_private import data_of, states_of
 from .container_facts import (
     ContainerFacts,
@@ -311,12 +312,11 @@ class Checkpointer:
         elif kind in _LEADS and node.has(event.target):
             yield fact_of(node.key, AT, [event.target, BEFORE, data.get(JUMPED_TO)])
         elif TAKEN_UP in data:
-            failed, *told = data[TAKEN_UP]
-            yield fact_of(node.key, AT, [failed, FAILED, *told])
+            failed, number, ended, text = data[TAKEN_UP]
+            yield fact_of(node.key, AT, [failed, FAILED, number, name_text(ended), text])
         elif kind is EventKind.FAILURE and event.failure_kind != FailureKind.INTERRUPTED:
-            yield fact_of(
-                node.key, AT, [label, FAILED, event.failure_kind, event.outcome, event.text]
-            )
+            told = event.failure_kind, name_text(event.outcome), event.text
+            yield fact_of(node.key, AT, [label, FAILED, *told])
         elif kind is EventKind.QUERY_OPENED:
             yield fact_of(node.key, ASKED, [label, event.query_id])
         elif kind is EventKind.QUERY_ANSWERED and event.outcome == _INTERFACE:
@@ -326,7 +326,7 @@ class Checkpointer:
         elif not _is_on_its_way(node):
             outcome = node.site.ended_by(event)
             if outcome is not None:
-                yield fact_of(node.key, AT, [outcome, ENDED])
+                yield fact_of(node.key, AT, [name_text(outcome), ENDED])
 
     def _facts_of_way(self, jump: Event, node: TreeNode) -> Iterator[Fact]:
         """Yield what a jump has changed of the failed state, and of the streaks around it.

@@ -37,12 +37,12 @@ from smach_oracle.store.rows import Fact
 
 from ..machine.container_records import ContainerRecords
 from ..records.history import History
+from ..settings.failing_outcomes import name_text
 from ..smach_private import remapping_of, states_of
 from .stored_tree import StoredContainer
 
 _NOTHING: Dict[str, object] = {}
-# an outcome that is no text is kept as its text
-_as_json = json.JSONEncoder(separators=(',', ':'), default=text_of).encode
+_as_json = json.JSONEncoder(separators=(',', ':')).encode
 
 
 def fact_of(path: str, name: str, plain: object) -> Fact:
@@ -129,7 +129,7 @@ class ContainerFacts:
             # as many names as visits are kept, so that the store does not grow with each
             yield from self._if_new(
                 '{}{}'.format(VISIT, number % cast('int', visits.maxlen)),
-                [state, outcome, int(result), self._execution, number],
+                [state, name_text(outcome), int(result), self._execution, number],
             )
         self._visits = total
 

@@ -24,6 +24,7 @@ from smach_oracle.store.store_file import StoreFile
 
 from ..errors import SettingsError
 from ..machine.nesting import children_of
+from ..settings.failing_outcomes import name_text
 from ..settings.settings import GROUPS
 from ..smach_private import (
     final_outcomes_of,
@@ -128,7 +129,7 @@ def _containers(
 
 def _states(container: smach.Container, meta: str) -> Dict[str, smach.State]:
     states = dict(children_of(container))
-    return {str(label): state for label, state in states.items() if label != meta}
+    return {name_text(label): state for label, state in states.items() if label != meta}
 
 
 def _container(container: smach.Container, meta: str) -> Plain:

@@ -24,6 +24,7 @@ from ..records.events import EventKind
 from ..records.facts import TrialEnd
 from ..records.running_goals import GOALS
 from ..settings.checks import ASK, RECOVER, RESTART, STATE
+from ..settings.failing_outcomes import name_text
 from ..settings.failure_rule import FORMER_RULE, RULE, rule_in
 from ..settings.settings import GROUPS
 from .checkpointer import Checkpointer
@@ -299,8 +300,7 @@ class TrialStore:
         self._observe_no_more()
         if self._observer is not None:
             self._observer.last_words(KEPT if why is TrialEnd.KEPT else EventKind.TRIAL_END.name)
-        told = outcome if isinstance(outcome, str) else str(outcome)
-        self._close(None if self.can_go_on(why) else Ending(at, told))
+        self._close(None if self.can_go_on(why) else Ending(at, name_text(outcome)))
 
     def let_go(self) -> None:
         """Let go of the store, as its trial does not begin. What it holds can still go on."""

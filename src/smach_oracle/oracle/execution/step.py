@@ -50,7 +50,7 @@ from ..recovery.verdict import (
     preempted_ending,
 )
 from ..scope.scope import Reason
-from ..settings.failing_outcomes import is_preempted
+from ..settings.failing_outcomes import is_preempted, name_text
 from ..smach_private import has_preempt_flag, lock_of, states_of, transitions_of
 from .applying import Applying
 from .departure import depart, is_settled, take_departure
@@ -141,7 +141,7 @@ class Step:
             failing, listed = node.in_force.failing, record.settings.failure_outcomes
             may_fail = (
                 outcome in failing
-                or outcome in listed
+                or name_text(outcome) in listed
                 # a state may have the name of a failing outcome
                 or (not judged.is_state and judged.target in failing)
             )

@@ -72,11 +72,15 @@ def stop_left_behind(node: TreeNode) -> Stop:
 
 
 def terminate(
-    node: TreeNode, label: str, outcome: str, container_outcome: str, told: Optional[str] = None
+    node: TreeNode,
+    label: str,
+    outcome: str,
+    container_outcome: str,
+    told_label: Optional[str] = None,
 ) -> str:
     """End the container. A preempt that its last state has serviced is serviced.
 
-    `told`: the state of the author's of which callbacks are told, `label` where it is None.
+    `told_label`: the state that callbacks are told, None for `label`.
     """
     machine = node.machine
     if has_preempt_flag(machine):
@@ -87,11 +91,15 @@ def terminate(
             and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
         ):
             machine.service_preempt()
-    return _end(node, label, outcome, container_outcome, told)
+    return _end(node, label, outcome, container_outcome, told_label)
 
 
 def _end(
-    node: TreeNode, label: str, outcome: str, container_outcome: str, told: Optional[str] = None
+    node: TreeNode,
+    label: str,
+    outcome: str,
+    container_outcome: str,
+    told_label: Optional[str] = None,
 ) -> str:
     machine = node.machine
     set_current_label(machine, None)
@@ -99,7 +107,7 @@ def _end(
         smach.loginfo(
             "State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome)
         )
-    machine.call_termination_cbs([label if told is None else told], container_outcome)
+    machine.call_termination_cbs([label if told_label is None else told_label], container_outcome)
     return container_outcome
 
 

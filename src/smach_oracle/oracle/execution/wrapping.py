@@ -39,13 +39,11 @@ def wrap_machine(
 
     :raises SettingsError: for what is no machine or cannot be wrapped, and for settings that do not
         fit it. A bare machine then stays bare.
-    :raises LabelError: for a label that is no text. Likewise.
+    :raises LabelError: for a label that is not text. Likewise.
     """
     if not isinstance(given, smach.StateMachine):
         raise SettingsError('machine', given, 'a smach.StateMachine')
-    why_not = why_no_oracle(given)
-    if why_not:
-        raise LabelError('{}: {}'.format(arguments.name or type(given).__name__, why_not))
+    _check_labels(given, arguments.name or type(given).__name__)
     if isinstance(given, tree.container_class):
         return _wrap_again(given, tree, arguments)
     try:
@@ -83,13 +81,21 @@ def bring_up_to_date(node: TreeNode) -> None:
     """Take notice of states added since.
 
     :raises SettingsError: where the settings do not fit them.
+    :raises LabelError: for a label that is not text.
     """
     if node.in_force.checked_states != len(states_of(node.machine)):
+        _check_labels(node.machine, node.path)
         sync_oracle(node)
         if node.parent is None:
             check_names(node)
         check_preconditions(node)
         node.in_force.checked_states = len(states_of(node.machine))
+
+
+def _check_labels(machine: smach.StateMachine, name: str) -> None:
+    why_not = why_no_oracle(machine)
+    if why_not:
+        raise LabelError('{}: {}'.format(name, why_not))
 
 
 def _configure(machine: smach.StateMachine, settings: Settings) -> None:
@@ -144,7 +150,9 @@ def _adopt_below(parent: TreeNode, found: Dict[int, TreeNode]) -> None:
             why_not = why_no_oracle(child)
             if why_not:
                 path = '/'.join((parent.path, *below))
-                smach.logwarn('{}: it has no oracle of its own, since {}'.format(path, why_not))
+                parent.tree.warn_for_good(
+                    '{}: it has no oracle of its own, since {}'.format(path, why_not)
+                )
                 continue
             tree = parent.tree
             node = _put_under(child, tree.container_class, tree, parent.settings, '')

@@ -103,10 +103,10 @@ def containers_of(container: object) -> List[Tuple[str, smach.Container]]:
 
 
 def why_no_oracle(container: smach.Container) -> str:
-    """Say which label of a container's states is no text, '' where all are."""
+    """Say which label of a container's states is not text, '' where all are."""
     for label, state in dict(children_of(container)).items():
         if not isinstance(label, str) and state is not None:
-            return 'the label {!r} of a state is no text; allowed: text, such as {!r}'.format(
+            return 'the label {!r} of a state is not text; allowed: text, such as {!r}'.format(
                 label, str(label)
             )
     return ''

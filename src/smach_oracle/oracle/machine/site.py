@@ -6,7 +6,7 @@ import smach
 
 from ..asking.question import OutcomeChoice
 from ..records.events import Event, EventKind, FailureKind
-from ..settings.failing_outcomes import FailingNames
+from ..settings.failing_outcomes import FailingNames, name_text
 from ..settings.settings import Settings, StateSettings
 from ..smach_private import break_outcomes_of, loop_outcomes_of, states_of, transitions_of
 
@@ -46,17 +46,18 @@ def route_of(machine: smach.StateMachine, label: str, outcome: str) -> Route:
 
 def outcome_told(outcomes: Iterable[str], told: object) -> str:
     """Return the outcome of which a record has the text, that text where there is none."""
-    text = str(told)
-    return next((each for each in outcomes if str(each) == text), text)
+    text = name_text(told)
+    return next((each for each in outcomes if name_text(each) == text), text)
 
 
 def failure_kind(
     outcome: str, route: Route, settings: StateSettings, failing: FailingNames
 ) -> FailureKind:
     """Classify a registered outcome, without regard to who recovers from it."""
-    if route.leads_on and outcome in settings.intended_outcomes:
+    text = name_text(outcome)
+    if route.leads_on and text in settings.intended_outcomes:
         return FailureKind.NOT_A_FAILURE
-    if outcome in settings.failure_outcomes:
+    if text in settings.failure_outcomes:
         return FailureKind.FAILING_OUTCOME
     if not route.leads_on:
         return FailureKind.UNREGISTERED_OUTCOME
@@ -80,7 +81,7 @@ def author_recovers(outcome: str, route: Route, kind: FailureKind, settings: Sta
     """
     if settings.author_recoveries == 'override' or kind is not FailureKind.FAILING_OUTCOME:
         return False
-    return route.is_state or outcome not in settings.failure_outcomes
+    return route.is_state or name_text(outcome) not in settings.failure_outcomes
 
 
 def leads_to_next_item(container: smach.Container, outcome: str) -> bool:

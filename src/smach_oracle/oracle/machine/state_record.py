@@ -78,7 +78,7 @@ class StateRecord:
     """
 
     def __init__(self, label: str, settings: StateSettings, special: bool = False) -> None:
-        self.label = label
+        self.label = str.__str__(label)  # that of a member of an Enum is its value
         self.fast: Dict[Any, FastEdge] = {}
         self.snapshot: Optional[Dict[str, object]] = None
         self.view: Optional['StateView'] = None  # from its last visit

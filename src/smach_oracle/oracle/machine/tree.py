@@ -77,6 +77,7 @@ class Tree:
         self.rates_loaded = ''  # the rates file read last
         self._questions: int  # in this trial
         self._said: Set[Tuple[str, ...]] = set()  # in this trial
+        self._said_for_good: Set[str] = set()
         self.process = forking.process
         self.be_at_rest(expert, health)
 
@@ -145,6 +146,12 @@ class Tree:
             is_new = about not in self._said
             self._said.add(about)
             return is_new
+
+    def warn_for_good(self, text: str) -> None:
+        """Warn of what stays so, once."""
+        if text not in self._said_for_good:
+            self._said_for_good.add(text)
+            smach.logwarn(text)
 
     def go_on_counting(self, visits: int, whole: Mapping[str, Any]) -> None:
         """Number visits behind `visits`, and go on with what the stored trial had spent.

@@ -14,6 +14,7 @@ from smach_common.foreign import error_text, repr_of
 
 from ..asking.question import names
 from ..decision.policy import FailureContext
+from ..identity import is_hashable
 from ..machine.nesting import gave_up_in, items_under_way, nodes_in
 from ..machine.places import failure_context
 from ..machine.resumed import Unfinished
@@ -23,7 +24,7 @@ from ..machine.tree_node import TreeNode
 from ..machine.workers import Overrun
 from ..records.events import EventKind, FailureKind
 from ..records.visits import Visit, VisitResult
-from ..settings.failing_outcomes import is_preempted
+from ..settings.failing_outcomes import is_preempted, name_text
 from ..smach_private import states_of
 from .guarding import may_stop_others
 from .stop import winds_down
@@ -142,7 +143,8 @@ def _judge(
         )
         told = outcome if isinstance(outcome, str) else ''
         failure = Failure(label, FailureKind.UNREGISTERED_OUTCOME, told, text)
-        if outcome is not None and not node.site.is_container:  # which takes it as it is
+        # a Concurrence takes it as it is, an Iterator, too
+        if outcome is not None and is_hashable(outcome) and not node.site.is_container:
             return failure._replace(route=Route(cast('str', outcome), False))
         return failure._replace(error=_once(partial(smach.InvalidTransitionError, text)))
     outcome = cast('str', outcome)
@@ -200,7 +202,7 @@ def _ended_as_intended(state: smach.State) -> bool:
                 and within is not None
                 and not route_of(node.machine, visit.state, visit.outcome).is_state
                 and (
-                    visit.outcome in node.settings_of(visit.state).intended_outcomes
+                    name_text(visit.outcome) in node.settings_of(visit.state).intended_outcomes
                     or _ended_as_intended(within)
                 )
             ):
@@ -355,7 +357,7 @@ def _to_failing_end(
         return judged.route if falls_through and not is_preempted(outcome) else None
     if judged.is_state or judged.target not in failing or is_preempted(outcome):
         return None
-    is_meant = outcome in record.settings.intended_outcomes
+    is_meant = name_text(outcome) in record.settings.intended_outcomes
     return judged if failing.excuse(outcome) and not is_meant else None
 
 

@@ -75,7 +75,8 @@ def foreseen_above(
         if kind is FailureKind.NOT_A_FAILURE or not route.leads_on:
             return None
         if author_recovers(outcome, route, kind, above.settings_of(label)):
-            return Foreseen('{}/{} {} -> {}'.format(above.path, label, outcome, route.target))
+            path = '/'.join((above.path, label))
+            return Foreseen('{} {} -> {}'.format(path, outcome, route.target))
         if route.is_state:  # `author_recoveries: override`
             return None
         node, outcome = above, route.target

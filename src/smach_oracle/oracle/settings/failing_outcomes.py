@@ -22,6 +22,11 @@ _SETTLED = frozenset(
 _WORDS = re.compile(r'[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[^\W\d_A-Za-z]+')
 
 
+def name_text(name: object) -> str:
+    """Return an outcome or a label as records, settings and answers have it: by its text."""
+    return name if isinstance(name, str) else str(name)
+
+
 def is_preempted(outcome: object) -> bool:
     """Whether an outcome is the one of a preempt. Outcomes need not be strings."""
     return isinstance(outcome, str) and outcome.lower() == PREEMPTED
@@ -58,7 +63,9 @@ class FailingNames:
         )
 
     def __contains__(self, outcome: object) -> bool:
-        return isinstance(outcome, str) and self._names_failure(outcome)
+        if self.by_name and not isinstance(outcome, str):
+            return False
+        return self._names_failure(name_text(outcome))
 
     def __reduce__(self) -> Tuple[object, ...]:
         """Return how a copied or pickled one is made: by its words."""

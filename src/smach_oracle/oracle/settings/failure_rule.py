@@ -12,6 +12,7 @@ from .failing_outcomes import (
     NEGATIONS,
     FailingNames,
     is_preempted,
+    name_text,
     sounds_like_success,
     words_of,
 )
@@ -64,10 +65,10 @@ class FailureRule(NamedTuple):
     def meaning(self, end: object) -> EndMeaning:
         """Return what it means that a machine has ended in this outcome.
 
-        By a list, each outcome that is not on it is a success. One that is no text goes by its
+        By a list, each outcome that is not on it is a success. One that is not text goes by its
         text, as which it is recorded.
         """
-        return _meaning_by(self.words, end if isinstance(end, str) else str(end))
+        return _meaning_by(self.words, name_text(end))
 
     def unknown(self, ends: Iterable[object]) -> Tuple[str, ...]:
         """Return those of some ends whose names say neither success nor failure, sorted."""

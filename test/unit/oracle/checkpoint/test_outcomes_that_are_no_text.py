@@ -18,7 +18,18 @@ class EndWord(enum.Enum):
     BAD = 2
 
 
-NAMES = [('ok', 'aborted'), (0, 1), (True, False), (EndWord.GOOD, EndWord.BAD)]
+class EndNumber(int, enum.Enum):
+    GOOD = 0
+    BAD = 1
+
+
+NAMES = [
+    ('ok', 'aborted'),
+    (0, 1),
+    (True, False),
+    (EndWord.GOOD, EndWord.BAD),
+    (EndNumber.GOOD, EndNumber.BAD),
+]
 
 
 class Program:
