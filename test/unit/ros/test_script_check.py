@@ -140,24 +140,29 @@ def test_the_report_says_where_the_other_branches_may_have_a_failure_kept(check)
     assert meant in drive and unless not in ' '.join(drive.split())
 
 
-def test_the_report_says_which_machine_runs_without_an_oracle(check):
-    code, report, errors = check(
-        """
+@pytest.mark.parametrize(
+    'inside, states, seen',
+    [
+        ("machine('LOOK', 'PICK')", '{PICK: {time_limit_s: 20}}', '2 machines'),
+        ('Runs()', '{}', '1 machine'),
+    ],
+)
+def test_the_report_says_which_machine_runs_without_an_oracle(check, inside, states, seen):
+    script = """
         sm = smach.StateMachine(outcomes=['succeeded', 'aborted', 'preempted'])
         with sm:
-            smach.StateMachine.add(0, machine('LOOK', 'PICK'))
+            smach.StateMachine.add(0, {})
         print('OUTCOME', sm.execute())
-    """,
-        'states: {PICK: {time_limit_s: 20}}',
-    )
+    """
+    code, report, errors = check(script.format(inside), 'states: ' + states)
     assert code == 0, errors
     why = (
         "Warning: TASK: the label 0 of a state is not text; allowed: text, such as '0'. It runs "
         'without an oracle'
     )
     assert why in ' '.join(report.split())
-    assert 'begins at LOOK' in report and 'time limit    20 s' in report
-    assert '1 warning: no error in the settings for 1 machine.' in report
+    assert ('begins at LOOK' in report) == ('time limit    20 s' in report) == ('PICK' in states)
+    assert '1 warning: no error in the settings for {}.'.format(seen) in report
     assert 'OUTCOME succeeded' in errors
 
 

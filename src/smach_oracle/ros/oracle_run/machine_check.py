@@ -95,6 +95,7 @@ class MachineCheck:
             if not is_left:
                 self._wrap(machine)
             if not isinstance(machine, OracleContainer):  # those in it are top machines
+                self.machines += 1
                 self._warn(warnings)
                 for each in list(_outermost_inside(machine)):
                     self._check(each, running)
