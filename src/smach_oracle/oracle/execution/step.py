@@ -156,13 +156,9 @@ class Step:
             return self._end_preempted(judged)
         keeps_way = node.tree.recover and keeps_authors_way(node, judged, record.settings)
         why = None
-        if (
-            node.tree.recover
-            and node.tree.health.is_set
-            and not (
-                keeps_way and may_stop_others(node, record.settings)  # who are to stop at once
-            )
-        ):
+        looks = node.tree.recover and node.tree.health.is_set
+        # not where others are to stop at once
+        if looks and not (keeps_way and may_stop_others(node, record.settings)):
             why = self._why_unwell()
         if node.execution.is_left_behind():
             return stop_left_behind(node)

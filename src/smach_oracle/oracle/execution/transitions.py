@@ -91,23 +91,18 @@ def terminate(
             and (preempted_state_of(machine) is not None or container_outcome == PREEMPTED)
         ):
             machine.service_preempt()
+    told_label = label if told_label is None else told_label
     return _end(node, label, outcome, container_outcome, told_label)
 
 
-def _end(
-    node: TreeNode,
-    label: str,
-    outcome: str,
-    container_outcome: str,
-    told_label: Optional[str] = None,
-) -> str:
+def _end(node: TreeNode, label: str, outcome: str, container_outcome: str, told_label: str) -> str:
     machine = node.machine
     set_current_label(machine, None)
     if node.site.is_container:
         smach.loginfo(
             "State machine terminating '%s':'%s':'%s'" % (label, outcome, container_outcome)
         )
-    machine.call_termination_cbs([label if told_label is None else told_label], container_outcome)
+    machine.call_termination_cbs([told_label], container_outcome)
     return container_outcome
 
 
@@ -139,4 +134,4 @@ def end_plainly(
     node.records.history.visited(edge.visit, record.has_preconditions)
     if node.events.observers:
         node.emit(EventKind.TRANSITION, state=record.label, outcome=outcome, target=ending)
-    return _end(node, record.label, outcome, ending)
+    return _end(node, record.label, outcome, ending, record.label)

@@ -154,7 +154,7 @@ def to_interface_goal(offer: Offer, question: Question) -> SharedAutonomyGoal:
 
 
 def _sendable(message: genpy.Message) -> genpy.Message:
-    """The message, with every text in it such that rospy can send it. Outcomes may be no text."""
+    """The message, with every text in it such that rospy can send it. Outcomes need not be text."""
     for field, kind in zip(message.__slots__, message._slot_types):
         setattr(message, field, _sendable_field(getattr(message, field), kind))
     return message

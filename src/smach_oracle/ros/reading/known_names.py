@@ -8,6 +8,7 @@ from typing import Any, Callable, Iterator, List, Mapping, Set
 
 import smach
 from smach_oracle.oracle.errors import SettingsError
+from smach_oracle.oracle.settings.failing_outcomes import name_text
 from smach_oracle.oracle.settings.names import UnfitKind, UnfitName, matches
 
 from .source_labels import is_in_sources
@@ -112,7 +113,7 @@ def names_in(container: smach.Container) -> Set[str]:
             continue
         seen.append(each)
         for label, state in children_of(each).items():
-            name = label if isinstance(label, str) else str(label)
+            name = name_text(label)
             path = '/'.join((above, name)) if above else name
             found.update((name, path), map(str, state.get_registered_outcomes()))
             if isinstance(state, smach.Container):
